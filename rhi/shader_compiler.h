@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/embedded_file.h"
+#include "core/error.h"
+#include "rhi/pipeline.h"
+
+/// @file
+/// GLSL to SPIR-V.
+///
+///     ShaderCompiler compiler({.embedded = {passes::embedded_files(), rhi::embedded_files()}});
+///     ShaderDesc shader = *compiler.compile({.path = "passes/lighting/lighting.comp", .defines = {{"SHADOWS", "1"}}});
+///     Shader handle = *device.create_shader(shader);
+
+namespace nacre {
+class DiskCache;
+}
+
+namespace nacre::rhi {
+
+struct ShaderDefine {
+    std::string name;
+    std::string value = "1";
+};
+
+struct ShaderCompilerDesc {
+    /// Files compiled into the program, searched by path ("passes/lighting/lighting.comp").
+    std::vector<std::span<const EmbeddedFile>> embedded;
+    /// Folder that holds the same paths as the embedded files; searched first where it is set. Default: the environment
+    /// variable NACRE_SHADER_DIR. This is what makes hot reload possible.
+    std::filesystem::path source_folder{};
+    DiskCache* cache = nullptr;     ///< Null: nothing is kept.
+    bool debug_information = true;  ///< Names, files and line tables that debuggers show.
+    bool optimize = false;          ///< Runs SPIRV-Tools' performance passes.
+};
+
+struct ShaderSource {
+    std::string path;               ///< Virtual path; the extension (.vert, .frag, .comp) tells the stage.
+    std::vector<ShaderDefine> defines{};
+    std::string text{};             ///< GLSL; empty: read from `path`.
+};
+
+/// Compiles GLSL 4.60 for Vulkan with `#include "path"` (relative to the including file, then from the root). The language
+/// is the one that all backends can run; `GL_GOOGLE_include_directive` is implied. Thread-safe.
+class ShaderCompiler {
+  public:
+    explicit ShaderCompiler(ShaderCompilerDesc desc);
+    ~ShaderCompiler();
+
+    /// Errors: not_found (names the including file and line), shader_compile with the whole log, each line as
+    /// "path:line: message", path being that of the include where the fault is.
+    Expected<ShaderDesc> compile(const ShaderSource& source);
+
+    /// True when a file that `compile` has read for this source has changed since on disk.
+    bool is_outdated(const ShaderSource& source) const;
+
+    /// Text of the last preprocessed files that a source depends on, by path.
+    std::vector<std::string> dependencies(const ShaderSource& source) const;
+
+    struct Statistics {
+        std::uint64_t compiled = 0, from_cache = 0, rebuilt_entries = 0;
+        double compile_ms = 0.0;
+    };
+    [[nodiscard]] Statistics statistics() const;
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace nacre::rhi
