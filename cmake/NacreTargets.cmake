@@ -66,7 +66,7 @@ function(nacre_add_part name)
 endfunction()
 
 # nacre_add_test(<name> SOURCES ... USES <part>... [LIBRARIES ...] [LABELS ...] [TIMEOUT seconds])
-# One GoogleTest program, registered with CTest under its name.
+# One GoogleTest program (with GoogleTest's own main() unless a source has one), registered with CTest under its name.
 function(nacre_add_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;USES;LIBRARIES;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)
@@ -76,7 +76,7 @@ function(nacre_add_test name)
   foreach(part IN LISTS ARG_USES)
     target_link_libraries(${name} PRIVATE nacre::${part})
   endforeach()
-  target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} GTest::gtest GTest::gmock)
+  target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} GTest::gmock GTest::gtest GTest::gtest_main)
   target_include_directories(${name} PRIVATE "${CMAKE_SOURCE_DIR}")
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
