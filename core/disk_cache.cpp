@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/disk_cache.h"
 
-#include "core/file.h"
-#include "core/log.h"
-
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,7 +13,8 @@
 #include <set>
 #include <system_error>
 
-#include <fmt/format.h>
+#include "core/file.h"
+#include "core/log.h"
 
 namespace nacre {
 namespace {

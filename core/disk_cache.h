@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "core/hash.h"
-
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -11,6 +9,8 @@
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "core/hash.h"
 
 /// @file
 /// Results that are costly to make (compiled shaders, pipelines, tables), kept on disk between runs.

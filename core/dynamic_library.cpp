@@ -2,7 +2,6 @@
 #include "core/dynamic_library.h"
 
 #include <dlfcn.h>
-
 #include <fmt/format.h>
 
 namespace nacre {
@@ -43,9 +42,7 @@ Expected<DynamicLibrary> DynamicLibrary::open(std::initializer_list<std::string_
                 debian_package.empty() ? "" : fmt::format("Install it: apt-get install {}", debian_package));
 }
 
-void* DynamicLibrary::find_address(const char* name) const noexcept {
-    return handle_ ? dlsym(handle_, name) : nullptr;
-}
+void* DynamicLibrary::find_address(const char* name) const noexcept { return handle_ ? dlsym(handle_, name) : nullptr; }
 
 Expected<void*> DynamicLibrary::address_of(const char* name) const {
     if (!handle_) return fail(ErrorCode::not_found, "find symbol", fmt::format("'{}'", name), "no library is open");

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "core/error.h"
-
 #include <initializer_list>
 #include <string>
 #include <string_view>
 #include <type_traits>
+
+#include "core/error.h"
 
 /// @file
 /// A library opened at run time: how Nacre reaches graphics drivers, so that a program starts on machines
@@ -38,18 +38,16 @@ class DynamicLibrary {
 
     /// The address of a function or variable, as the pointer type `Pointer`; an error names symbol and library.
     template <typename Pointer>
-        requires std::is_pointer_v<Pointer>
-    Expected<Pointer> symbol(const char* name) const {
+    requires std::is_pointer_v<Pointer> Expected<Pointer> symbol(const char* name)
+    const {
         NACRE_TRY(void* address, address_of(name));
         return reinterpret_cast<Pointer>(address);
     }
 
     /// As `symbol` for something optional: null where the library does not have it.
     template <typename Pointer>
-        requires std::is_pointer_v<Pointer>
-    Pointer find(const char* name) const noexcept {
-        return reinterpret_cast<Pointer>(find_address(name));
-    }
+    requires std::is_pointer_v<Pointer> Pointer find(const char* name)
+    const noexcept { return reinterpret_cast<Pointer>(find_address(name)); }
 
     /// The one of the names that was opened; empty where nothing is.
     [[nodiscard]] const std::string& name() const { return name_; }

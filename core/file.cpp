@@ -2,6 +2,7 @@
 #include "core/file.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -11,16 +12,14 @@
 #include <new>
 #include <system_error>
 
-#include <fmt/format.h>
-
 namespace nacre {
 namespace {
 
 std::string quoted(const std::filesystem::path& path) { return fmt::format("'{}'", path.native()); }
 
 std::unexpected<Error> system_failure(std::string attempted, const std::filesystem::path& path, int error_number) {
-    const ErrorCode code = error_number == ENOENT || error_number == ENOTDIR ? ErrorCode::not_found
-                                                                             : ErrorCode::input_output;
+    const ErrorCode code =
+        error_number == ENOENT || error_number == ENOTDIR ? ErrorCode::not_found : ErrorCode::input_output;
     std::string remedy;
     if (code == ErrorCode::not_found)
         remedy = "Check the path; it is taken relative to the folder in which the program was started.";
@@ -53,7 +52,7 @@ Expected<Container> read_file(const std::filesystem::path& path, std::uint64_t l
     constexpr const char* attempted = "read file";
     const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
     if (file.get() < 0) return system_failure(attempted, path, errno);
-    struct stat status{};
+    struct stat status {};
     if (::fstat(file.get(), &status) != 0) return system_failure(attempted, path, errno);
     if (S_ISDIR(status.st_mode))
         return fail(ErrorCode::input_output, attempted, quoted(path), "it is a folder", "Name a file.");
@@ -103,7 +102,7 @@ Expected<std::string> read_text_file(const std::filesystem::path& path, std::uin
 
 Expected<void> write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
     constexpr const char* attempted = "write file";
-    struct stat status{};
+    struct stat status {};
     // What is no ordinary file (a pipe, /dev/stdout) cannot be replaced, only written to.
     const bool is_device = ::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
     const std::filesystem::path folder = path.parent_path();

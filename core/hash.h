@@ -60,8 +60,7 @@ class Hasher {
 
     /// A number, an enumerator or a bool, by its bytes: -0.0 and 0.0 differ.
     template <typename T>
-        requires(std::is_arithmetic_v<T> || std::is_enum_v<T>)
-    Hasher& add(T value) {
+    requires(std::is_arithmetic_v<T> || std::is_enum_v<T>) Hasher& add(T value) {
         return add_bytes(std::as_bytes(std::span<const T, 1>(&value, 1)));
     }
     Hasher& add(const Hash128& hash) { return add(hash.high).add(hash.low); }
@@ -79,7 +78,7 @@ class Hasher {
 
 template <>
 struct std::hash<nacre::Hash128> {
-    std::size_t operator()(const nacre::Hash128& hash) const noexcept {
-        return static_cast<std::size_t>(hash.low ^ (hash.high * 0x9e3779b97f4a7c15ULL));
+    std::size_t operator()(const nacre::Hash128& value) const noexcept {
+        return static_cast<std::size_t>(value.low ^ (value.high * 0x9e3779b97f4a7c15ULL));
     }
 };

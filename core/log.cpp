@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/log.h"
 
-#include "core/progress.h"
+#include <spdlog/logger.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
 
 #include <array>
 #include <atomic>
@@ -11,8 +12,7 @@
 #include <string>
 #include <utility>
 
-#include <spdlog/logger.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
+#include "core/progress.h"
 
 namespace nacre {
 namespace {
@@ -65,7 +65,9 @@ std::string_view name_of(LogLevel level) {
     return index < level_names.size() ? level_names[index] : "unknown";
 }
 
-bool log_is_on(LogLevel level) { return level != LogLevel::off && level >= log().level.load(std::memory_order_relaxed); }
+bool log_is_on(LogLevel level) {
+    return level != LogLevel::off && level >= log().level.load(std::memory_order_relaxed);
+}
 
 void log_message(LogLevel level, std::string_view message) {
     if (!log_is_on(level)) return;

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/progress.h"
 
+#include <fmt/format.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <cstdlib>
-
-#include <fmt/format.h>
 
 namespace nacre {
 namespace {
@@ -90,8 +89,10 @@ void Progress::update(std::uint64_t done, std::string_view item) {
     last_shown_ = now;
 
     std::string text = step_;
-    if (total_ > 0) text += fmt::format(" {}/{}", done, total_);
-    else if (done > 0) text += fmt::format(" {}", done);
+    if (total_ > 0)
+        text += fmt::format(" {}/{}", done, total_);
+    else if (done > 0)
+        text += fmt::format(" {}", done);
     if (!item.empty()) text += fmt::format(": {}", item);
     if (is_line) {
         erase_line();

@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/disk_cache.h"
 
-#include "core/file.h"
-#include "core/log.h"
-#include "tests/core/temporary_folder.h"
-
+#include <gmock/gmock.h>
 #include <stdlib.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <gmock/gmock.h>
-
 #include <chrono>
 #include <optional>
 #include <thread>
+
+#include "core/file.h"
+#include "core/log.h"
+#include "tests/core/temporary_folder.h"
 
 namespace nacre {
 namespace {
@@ -117,7 +116,8 @@ TEST_F(DiskCacheTest, ProcessesThatWriteTheSameEntriesNeverReadDamage) {
     constexpr int rounds = 100;
     // Content depends on the key alone, but its length and writer vary: a torn entry cannot pass for a whole one.
     const auto content = [](int key, int process) {
-        return bytes_of(std::string(static_cast<std::size_t>(20000 + key * 100 + process), static_cast<char>('a' + process)));
+        return bytes_of(
+            std::string(static_cast<std::size_t>(20000 + key * 100 + process), static_cast<char>('a' + process)));
     };
     std::vector<pid_t> children;
     for (int process = 0; process < process_count; ++process) {
@@ -218,7 +218,8 @@ TEST_F(DiskCacheTest, ShrinkingRemovesWhatWasLongestNotUsed) {
 TEST(DiskCacheDirectory, ComesFromTheEnvironment) {
     const char* const names[] = {"NACRE_CACHE_DIR", "XDG_CACHE_HOME", "HOME"};
     std::vector<std::optional<std::string>> saved;
-    for (const char* name : names) saved.push_back(getenv(name) ? std::optional<std::string>(getenv(name)) : std::nullopt);
+    for (const char* name : names)
+        saved.push_back(getenv(name) ? std::optional<std::string>(getenv(name)) : std::nullopt);
 
     for (const char* name : names) unsetenv(name);
     EXPECT_EQ(DiskCache::default_directory(), fs::path());

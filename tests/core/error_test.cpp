@@ -7,8 +7,7 @@ namespace nacre {
 namespace {
 
 Expected<int> parse_digit(char c) {
-    if (c < '0' || c > '9')
-        return fail(ErrorCode::parse, "read digit", "'x'", "it is not in 0..9", "Write a digit.");
+    if (c < '0' || c > '9') return fail(ErrorCode::parse, "read digit", "'x'", "it is not in 0..9", "Write a digit.");
     return c - '0';
 }
 

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/file.h"
 
-#include "tests/core/temporary_folder.h"
-
-#include <sys/stat.h>
-
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <atomic>
 #include <fstream>
 #include <thread>
+
+#include "tests/core/temporary_folder.h"
 
 namespace nacre {
 namespace {
@@ -81,7 +80,7 @@ TEST(File, AFullDiskIsAnError) {
     auto written = write_file_atomically("/dev/full", "x");
     ASSERT_FALSE(written);
     EXPECT_THAT(written.error().message(), HasSubstr("No space left on device"));
-    struct stat status{};
+    struct stat status {};
     ASSERT_EQ(stat("/dev/full", &status), 0);
     EXPECT_TRUE(S_ISCHR(status.st_mode)) << "a device was replaced by a file";
 }

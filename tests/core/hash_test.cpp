@@ -38,7 +38,8 @@ TEST(Hasher, IncrementalBytesEqualTheWhole) {
     const std::string text(5000, 'x');
     const auto bytes = std::as_bytes(std::span(text));
     Hasher hasher;
-    for (std::size_t i = 0; i < bytes.size(); i += 13) hasher.add_bytes(bytes.subspan(i, std::min<std::size_t>(13, bytes.size() - i)));
+    for (std::size_t i = 0; i < bytes.size(); i += 13)
+        hasher.add_bytes(bytes.subspan(i, std::min<std::size_t>(13, bytes.size() - i)));
     EXPECT_EQ(hasher.finish(), hash128(bytes));
 }
 

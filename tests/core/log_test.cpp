@@ -14,9 +14,8 @@ namespace {
 class LogTest : public testing::Test {
   protected:
     void SetUp() override {
-        previous_ = set_log_callback([this](LogLevel level, std::string_view message) {
-            messages_.emplace_back(level, message);
-        });
+        previous_ = set_log_callback(
+            [this](LogLevel level, std::string_view message) { messages_.emplace_back(level, message); });
     }
     void TearDown() override {
         set_log_callback(previous_);
