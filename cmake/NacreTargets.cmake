@@ -63,6 +63,12 @@ function(nacre_add_part name)
   endforeach()
   target_link_libraries(${target} PRIVATE ${ARG_LIBRARIES})
   install(TARGETS ${target} EXPORT nacre-targets)
+  # For nacreConfig.cmake: who links the installed library needs the packages behind it.
+  foreach(library IN LISTS ARG_LIBRARIES)
+    if(library MATCHES "^([^:]+)::")
+      set_property(GLOBAL APPEND PROPERTY NACRE_PACKAGES "${CMAKE_MATCH_1}")
+    endif()
+  endforeach()
 endfunction()
 
 # nacre_add_test(<name> SOURCES ... USES <part>... [LIBRARIES ...] [LABELS ...] [TIMEOUT seconds])
