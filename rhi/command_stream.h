@@ -233,11 +233,15 @@ struct CommandStream {
         std::size_t used = 0;
     };
     std::vector<Block> blocks;
+    std::size_t current_block = 0;  ///< Blocks behind it are empty, kept for reuse.
     std::vector<std::string> strings;
     std::string name;
     Expected<void> status{};
-    class CommandRecorder* recorder = nullptr;  ///< Front-end state for validation while recording; owned by the stream's device.
-    std::shared_ptr<void> recorder_owner;
+    /// Checks calls while recording; null where validation is off.
+    std::shared_ptr<class CommandValidator> validator;
+    /// Where the stream came from, and goes back to; null for streams of the front end itself.
+    std::shared_ptr<class StreamPool> pool;
+    std::uint16_t device = 0;       ///< Number of the device that the list was made by.
 
     /// Appends a command of type T with `extra` bytes behind it and returns it, value-initialized.
     template <typename T>
@@ -260,15 +264,30 @@ struct CommandStream {
             }
     }
 
+    /// Forgets all commands and keeps the memory.
+    void clear() {
+        for (Block& block : blocks) block.used = 0;
+        current_block = 0;
+        strings.clear();
+        name.clear();
+        status = {};
+    }
+
   private:
     std::byte* reserve(std::size_t bytes) {
-        if (blocks.empty() || blocks.back().used + bytes > blocks.back().capacity) {
-            const std::size_t capacity = bytes > 65536 ? bytes : 65536;
-            blocks.push_back({std::make_unique_for_overwrite<std::byte[]>(capacity), capacity, 0});
-        }
-        std::byte* memory = blocks.back().data.get() + blocks.back().used;
-        blocks.back().used += bytes;
+        if (blocks.empty() || blocks[current_block].used + bytes > blocks[current_block].capacity) add_block(bytes);
+        Block& block = blocks[current_block];
+        std::byte* memory = block.data.get() + block.used;
+        block.used += bytes;
         return memory;
+    }
+    /// Makes the next block current: an empty one that was kept, or a new one where that is too small.
+    void add_block(std::size_t bytes) {
+        if (!blocks.empty()) ++current_block;
+        if (current_block < blocks.size() && blocks[current_block].capacity >= bytes) return;
+        const std::size_t capacity = bytes > 65536 ? bytes : 65536;
+        blocks.insert(blocks.begin() + static_cast<std::ptrdiff_t>(current_block),
+                      Block{std::make_unique_for_overwrite<std::byte[]>(capacity), capacity, 0});
     }
 };
 

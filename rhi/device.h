@@ -155,7 +155,8 @@ class Device {
     Expected<BindGroupLayoutDesc> describe(BindGroupLayout layout) const;
 
     // Content. Writes are copied at the call and take effect before the next submission; reads wait for all
-    // submitted work.
+    // submitted work. Buffers need no usage flag for it; textures need copy_destination to be written and copy_source to
+    // be read.
     Expected<void> write_buffer(Buffer buffer, std::span<const std::byte> data, std::uint64_t offset = 0);
     template <typename T>
     Expected<void> write_buffer(Buffer buffer, std::span<const T> data, std::uint64_t offset = 0) {
