@@ -5,9 +5,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <set>
@@ -63,6 +65,31 @@ void warn_once(const fs::path& directory, const std::string& reason) {
                 fmt::format("cache folder '{}' cannot be used: {} Going on without it; set NACRE_CACHE_DIR to another "
                             "folder, or to 'off'.",
                             directory.native(), reason));
+}
+
+/// True the first time that this process asks for this folder.
+bool is_first_time(const fs::path& directory) {
+    static std::mutex mutex;
+    static std::set<fs::path> seen;
+    std::lock_guard lock(mutex);
+    return seen.insert(directory).second;
+}
+
+std::uint64_t limit_bytes() {
+    constexpr std::uint64_t default_megabytes = 2048;
+    std::uint64_t megabytes = default_megabytes;
+    if (const char* wanted = std::getenv("NACRE_CACHE_LIMIT_MB")) {
+        const char* end = wanted + std::strlen(wanted);
+        if (const auto [stop, error] = std::from_chars(wanted, end, megabytes); error != std::errc() || stop != end) {
+            log_message(LogLevel::warning,
+                        fmt::format("NACRE_CACHE_LIMIT_MB is '{}', which is no number of megabytes; taking {}", wanted,
+                                    default_megabytes));
+            megabytes = default_megabytes;
+        }
+    }
+    if (megabytes == 0 || megabytes > (std::numeric_limits<std::uint64_t>::max() >> 20))
+        return std::numeric_limits<std::uint64_t>::max();
+    return megabytes << 20;
 }
 
 bool is_valid_category(std::string_view category) {
@@ -183,6 +210,9 @@ bool DiskCache::store(std::string_view category, const Hash128& key, std::span<c
         warn_once(directory_, written.error().message());
         return false;
     }
+    // Who only reads does not make the folder grow, so this is the place to look.
+    if (is_first_time(directory_))
+        if (const std::uint64_t limit = limit_bytes(); size() > limit) shrink_to(limit / 2);
     return true;
 }
 

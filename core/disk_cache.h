@@ -22,8 +22,10 @@
 ///
 /// A cache may be emptied at any time and never makes anything fail: an entry that is damaged, truncated, foreign or
 /// of another format is removed and counts as missing; where the folder cannot be used, one warning is logged and
-/// nothing is kept. Any number of threads and processes may use one folder. The key must name everything
-/// that the content depends on, the version of the code that makes it included.
+/// nothing is kept. A folder that has grown over the limit (NACRE_CACHE_LIMIT_MB in the environment, 2048 where it is
+/// not set, 0 for none) is cut to half of it, least recently used entries first, once in each run. Any number of
+/// threads and processes may use one folder. The key must name everything that the content depends on, the version of
+/// the code that makes it included.
 
 namespace nacre {
 

@@ -215,6 +215,28 @@ TEST_F(DiskCacheTest, ShrinkingRemovesWhatWasLongestNotUsed) {
     EXPECT_TRUE(cache_.load("spirv", "c"));
 }
 
+TEST_F(DiskCacheTest, AFolderOverTheLimitIsCutToHalfOncePerRun) {
+    setenv("NACRE_CACHE_LIMIT_MB", "1", 1);
+    const std::string large(400 << 10, 'x');
+    // Made as another process would: the first store of this process is the one that looks.
+    const pid_t child = fork();
+    if (child == 0) {
+        setenv("NACRE_CACHE_LIMIT_MB", "0", 1);
+        for (const char* key : {"a", "b", "c"}) cache_.store("spirv", key, bytes_of(large));
+        _exit(0);
+    }
+    ASSERT_EQ(waitpid(child, nullptr, 0), child);
+    EXPECT_EQ(cache_.entries(), 3U);
+    const auto old = cache_.directory() / "spirv" / (hash128("c").to_string() + ".entry");
+    fs::last_write_time(old, fs::file_time_type::clock::now() - std::chrono::hours(1));
+
+    cache_.store("spirv", "d", bytes_of("small"));
+    EXPECT_LE(cache_.size(), 512U << 10);
+    EXPECT_TRUE(cache_.load("spirv", "d"));
+    EXPECT_FALSE(cache_.load("spirv", "c"));
+    unsetenv("NACRE_CACHE_LIMIT_MB");
+}
+
 TEST(DiskCacheDirectory, ComesFromTheEnvironment) {
     const char* const names[] = {"NACRE_CACHE_DIR", "XDG_CACHE_HOME", "HOME"};
     std::vector<std::optional<std::string>> saved;
