@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/environment.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
+
+#include "core/image.h"
 
 namespace nacre::scene {
 namespace {
@@ -70,6 +74,34 @@ glm::vec2 environment_uv(const glm::vec3& direction) {
     if (!(length > 0.0f)) return {0.5f, 0.5f};
     const float azimuth = std::atan2(direction.x, -direction.z);
     return {0.5f + azimuth / (2.0f * pi), std::acos(std::clamp(direction.y / length, -1.0f, 1.0f)) / pi};
+}
+
+Expected<Environment> load_environment(const std::string& path) {
+    const ImageLimits limits{.max_width = 16384, .max_height = 8192};
+    auto info = read_image_info(path, limits);
+    if (info && info->format != ImageFormat::radiance && info->format != ImageFormat::openexr) {
+        return fail(ErrorCode::unsupported, "load environment", "'" + path + "'",
+                    fmt::format("it is a {} file, which cannot hold the brightness of a light source", name_of(info->format)),
+                    "Use a Radiance (.hdr) or OpenEXR (.exr) picture.");
+    }
+    auto picture = info ? read_image(path, limits) : std::unexpected(info.error());
+    if (!picture) {
+        Error error = picture.error();
+        error.attempted = "load environment";
+        error.subject = "'" + path + "'";
+        return std::unexpected(std::move(error));
+    }
+
+    static constexpr float largest_half = 65504.0f;
+    const auto clean = [](float value) { return value > 0.0f ? std::min(value, largest_half) : 0.0f; };
+    Environment result{.name = path, .width = picture->width, .height = picture->height};
+    result.texels.reserve(picture->texel_count());
+    for (std::size_t i = 0; i < picture->texel_count(); ++i) {
+        const float* texel = picture->pixels.data() + i * picture->channels;
+        const glm::vec3 rgb = picture->channels >= 3 ? glm::vec3(texel[0], texel[1], texel[2]) : glm::vec3(texel[0]);
+        result.texels.emplace_back(clean(rgb.r), clean(rgb.g), clean(rgb.b), 1.0f);
+    }
+    return result;
 }
 
 Environment studio_environment() {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -24,21 +26,19 @@ namespace nacre::scene {
 
 /// What a file may ask for. A file that asks for more is refused with an error that names the limit.
 struct LoadLimits {
-    std::uint64_t file_bytes = std::uint64_t{4} << 30;        ///< Of any one file that is read.
-    std::uint64_t json_bytes = std::uint64_t{256} << 20;      ///< Of the JSON part.
-    std::uint32_t json_depth = 64;                            ///< Nesting of JSON objects and arrays.
-    std::uint32_t nodes_in_scene = 1'000'000;                 ///< Nodes that are placed.
-    std::uint64_t vertices = std::uint64_t{1} << 28;          ///< Of the whole scene, after deformed copies.
-    std::uint64_t indices = std::uint64_t{1} << 30;           ///< Of the whole scene.
-    std::uint64_t instances = std::uint64_t{1} << 24;         ///< Placements of meshes in the whole scene.
-    std::uint32_t image_side = 16384;                         ///< Texels along one side of a picture.
-    std::uint64_t image_bytes = std::uint64_t{8} << 30;       ///< Of all decoded pictures together.
+    std::uint64_t file_bytes = std::uint64_t{4} << 30;       ///< Of any one file that is read.
+    std::uint64_t json_bytes = std::uint64_t{256} << 20;     ///< Of the JSON part.
+    std::uint32_t json_depth = 64;                           ///< Nesting of JSON objects and arrays.
+    std::uint64_t geometry_bytes = std::uint64_t{16} << 30;  ///< Of all vertices, indices and placements. A scene is
+                                                             ///< also held to 256 MiB + 1024 times its own size.
+    std::uint64_t image_bytes = std::uint64_t{8} << 30;      ///< Of all decoded pictures together.
+    std::uint32_t image_side = 16384;                        ///< Texels along one side of a picture.
 };
 
 struct LoadOptions {
-    float time = 0.0f;           ///< Seconds into the animation; clamped to its range, as glTF says.
-    int animation = 0;           ///< Which animation of the file moves the scene; -1: none.
-    bool load_images = true;     ///< false: images stay 1 x 1 white (geometry tools, tests).
+    std::optional<float> time;  ///< Seconds into the animation, clamped to its range; nothing: the pose at rest.
+    std::uint32_t animation = 0;  ///< Which animation of the file moves the scene, where `time` is given.
+    bool load_images = true;      ///< false: pictures are not decoded but 1 x 1 white (geometry tools, tests).
     LoadLimits limits;
 };
 
@@ -49,7 +49,7 @@ struct LoadOptions {
 
 /// Loads glTF from memory, as `load_scene` does from a file. `name` appears in messages; `folder` is where files named
 /// by relative URIs are looked for; empty: such URIs are an error. Binary (.glb) content is recognized by itself.
-[[nodiscard]] Expected<Scene> load_gltf(std::span<const std::uint8_t> bytes, const std::string& name,
+[[nodiscard]] Expected<Scene> load_gltf(std::span<const std::byte> bytes, const std::string& name,
                                         const std::string& folder, const LoadOptions& options = {});
 
 }  // namespace nacre::scene
