@@ -23,8 +23,8 @@ foreach(part core rhi materials scene passes measure)
 endforeach()
 # Of a backend a program needs only the header that declares it.
 foreach(backend vulkan gl)
-  if(EXISTS "${CMAKE_SOURCE_DIR}/backends/${backend}/backend.h")
-    install(FILES "${CMAKE_SOURCE_DIR}/backends/${backend}/backend.h"
+  if(EXISTS "${CMAKE_SOURCE_DIR}/backends/${backend}/${backend}_backend.h")
+    install(FILES "${CMAKE_SOURCE_DIR}/backends/${backend}/${backend}_backend.h"
       DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/nacre/backends/${backend}")
   endif()
 endforeach()

@@ -25,6 +25,13 @@ elseif(NOT NACRE_SANITIZER STREQUAL "")
   message(FATAL_ERROR "NACRE_SANITIZER is '${NACRE_SANITIZER}'; it can be empty, 'address' or 'thread'")
 endif()
 
+if(NACRE_BUILD_FUZZERS)
+  if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+    message(FATAL_ERROR "NACRE_BUILD_FUZZERS needs clang: use the preset 'fuzz'")
+  endif()
+  add_compile_options(-fsanitize=fuzzer-no-link)
+endif()
+
 # nacre_embed_files(<target> NAMESPACE <c++ namespace> FILES <path>...)
 # Puts text files (GLSL, JSON) into the program: generates embedded_files.h/.cpp in the given
 # namespace with `std::span<const nacre::EmbeddedFile> embedded_files()`; paths are those below the
@@ -86,4 +93,24 @@ function(nacre_add_test name)
   target_include_directories(${name} PRIVATE "${CMAKE_SOURCE_DIR}")
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
+endfunction()
+
+# nacre_add_fuzzer(<name ending in _fuzz> SOURCES ... USES <part>... [LIBRARIES ...])
+# One libFuzzer program, run by `./run fuzz`; its seeds are the files in tests/seeds/<name>. Nothing without
+# NACRE_BUILD_FUZZERS.
+function(nacre_add_fuzzer name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;USES;LIBRARIES" ${ARGN})
+  if(NOT NACRE_BUILD_FUZZERS)
+    return()
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  foreach(part IN LISTS ARG_USES)
+    target_link_libraries(${name} PRIVATE nacre::${part})
+  endforeach()
+  target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES})
+  target_link_options(${name} PRIVATE -fsanitize=fuzzer)
+  if(NOT TARGET fuzzers)
+    add_custom_target(fuzzers)
+  endif()
+  add_dependencies(fuzzers ${name})
 endfunction()

@@ -125,6 +125,9 @@ class HeaderWalk {
                 return damaged(format, subject_, fmt::format("attribute '{}' claims {} bytes", name, size));
             }
             const std::size_t end = position_ + size;
+            // Which of two windows or channel lists holds is not defined, so the library may take the other one.
+            if ((name == "dataWindow" && has_window) || (name == "channels" && has_channels))
+                return damaged(format, subject_, fmt::format("attribute '{}' occurs twice", name));
             if (name == "dataWindow") {
                 if (type != "box2i" || size != 16) return damaged(format, subject_, "the data window is malformed");
                 NACRE_CHECK(read_window(summary, part));
@@ -254,10 +257,12 @@ Expected<ImageInfo> exr_info(std::span<const std::byte> data, const std::string&
 
 Expected<LayeredImage> decode_exr(std::span<const std::byte> data, const std::string& subject) {
     NACRE_TRY(const HeaderSummary summary, HeaderWalk(data, subject).run());
-    // No compression of OpenEXR comes near this factor; a picture that needs it is a small file with a big claim.
-    constexpr std::uint64_t largest_compression = 1 << 16;
+    // A small file with a big claim. Pictures of one color compress by up to 65,536 (by PIZ), those that hold anything by
+    // less than 1,024 (the bound of deflate): beyond a gigabyte, a picture has to hold something.
     const std::uint64_t pixels = std::uint64_t{summary.info.width} * summary.info.height;
-    if (summary.bytes_per_pixel == 0 || pixels / largest_compression > data.size() / summary.bytes_per_pixel) {
+    const double claimed_bytes = static_cast<double>(pixels) * static_cast<double>(summary.bytes_per_pixel);
+    const double file_bytes = static_cast<double>(data.size());
+    if (summary.bytes_per_pixel == 0 || claimed_bytes > std::min(file_bytes * 65536, std::max(0x1p30, file_bytes * 1024))) {
         return damaged(format, subject, fmt::format("{} bytes cannot hold {} x {} pixels of {} bytes", data.size(),
                                                     summary.info.width, summary.info.height, summary.bytes_per_pixel));
     }
@@ -268,6 +273,13 @@ Expected<LayeredImage> decode_exr(std::span<const std::byte> data, const std::st
         LayeredImage image{static_cast<std::uint32_t>(window.max.x - window.min.x + 1),
                            static_cast<std::uint32_t>(window.max.y - window.min.y + 1),
                            {}};
+        std::uint64_t bytes_per_pixel = 0;
+        for (int part = 0; part < file.parts(); ++part)
+            for (auto c = file.header(part).channels().begin(); c != file.header(part).channels().end(); ++c)
+                bytes_per_pixel += 4;
+        // What was checked against the limits must be what the library read.
+        if (std::uint64_t{image.width} * image.height > pixels || bytes_per_pixel > summary.bytes_per_pixel)
+            return damaged(format, subject, "the header is ambiguous");
         for (int part = 0; part < file.parts(); ++part) {
             const Imf::Header& header = file.header(part);
             const bool flat = !header.hasType() || header.type() == Imf::SCANLINEIMAGE || header.type() == Imf::TILEDIMAGE;

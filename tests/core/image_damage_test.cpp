@@ -148,6 +148,18 @@ TEST(ImageDamageTest, HugeClaimsAreRefusedBeforeMemoryIsTaken) {
     EXPECT_LT(peak_memory_bytes() - before, std::size_t{100} << 20);
 }
 
+TEST(ImageDamageTest, AnExrHeaderThatSaysTwoThingsIsRefused) {
+    for (const auto& [name, bytes] : {std::pair<std::string, std::size_t>{"dataWindow", 11 + 6 + 4 + 16},
+                                      std::pair<std::string, std::size_t>{"channels", 9 + 7 + 4 + 3 * 18 + 1}}) {
+        std::string exr = sample_exr();
+        const std::size_t begin = exr.find(name);
+        exr.insert(begin, exr.substr(begin, bytes));
+        const auto image = read_image(bytes_of(exr), "twice.exr");
+        ASSERT_FALSE(image);
+        EXPECT_THAT(image.error().message(), HasSubstr("'" + name + "' occurs twice"));
+    }
+}
+
 TEST(ImageDamageTest, LimitsOfTheCallerHold) {
     const std::string png = sample_png();
     for (const ImageLimits& limits :
