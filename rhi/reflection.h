@@ -24,7 +24,8 @@ struct ReflectedBinding {
     FormatKind sampled_kind = FormatKind::floating;      ///< floating, uint or sint.
     Format image_format = Format::undefined;             ///< Storage images with a format qualifier.
     std::uint64_t block_size = 0;       ///< Bytes of a buffer block without its unbounded tail.
-    std::string name;
+    bool used = false;                  ///< False: declared, but no code that the entry point reaches names it.
+    std::string name;                   ///< Of the variable, or of the block where the variable has none.
 };
 
 struct ReflectedVariable {
@@ -32,6 +33,7 @@ struct ReflectedVariable {
     std::uint32_t index = 0;            ///< 1 for the second source of dual-source blending.
     FormatKind kind = FormatKind::floating;              ///< floating, uint or sint.
     std::uint32_t components = 4;       ///< 1 to 4 (of one column).
+    std::uint32_t first_component = 0;  ///< layout(component = ...).
     std::uint32_t locations = 1;        ///< Locations taken (matrices, arrays).
     std::string name;
 };
@@ -41,7 +43,8 @@ struct ReflectedSpecialization {
     std::string name;
 };
 
-/// What one entry point declares.
+/// What one entry point declares. Variables that GLSL declares and never uses are part of it, so that layouts do not
+/// depend on what an optimizer leaves over; in a module of several entry points, each has those that it uses.
 struct ShaderReflection {
     ShaderStage stage = ShaderStage::none;
     std::vector<ReflectedBinding> bindings;      ///< Sorted by set, then binding.
@@ -59,8 +62,12 @@ struct ShaderReflection {
     std::vector<std::string> capabilities;       ///< SPIR-V capabilities by name ("Shader", "Int64", ...).
 };
 
-/// Validates SPIR-V (Vulkan 1.1 rules and later) and reflects one entry point.
-/// Errors: shader_compile with the word offset and the validator's text. Any input is safe.
+/// Validates SPIR-V (Vulkan 1.1 rules and later) and reflects one entry point. Any input is safe, from any thread.
+///
+///     NACRE_TRY(ShaderReflection reflection, reflect(words, ShaderStage::compute, "main", "cull.comp"));
+///
+/// Errors: shader_compile with the word offset and the validator's text, also where the module has no such entry point or
+/// has it for another stage; unsupported for capabilities and kinds of resources that no backend takes.
 Expected<ShaderReflection> reflect(std::span<const std::uint32_t> spirv, ShaderStage stage,
                                    const std::string& entry_point = "main", const std::string& name = {});
 

@@ -48,8 +48,12 @@ struct ShaderSource {
     std::string text{};             ///< GLSL; empty: read from `path`.
 };
 
-/// Compiles GLSL 4.60 for Vulkan with `#include "path"` (relative to the including file, then from the root). The language
-/// is the one that all backends can run; `GL_GOOGLE_include_directive` is implied. Thread-safe.
+/// Compiles GLSL 4.60 for Vulkan to SPIR-V 1.3, with `#include "path"` (relative to the including file, then from the root)
+/// and `#pragma once`. `GL_GOOGLE_include_directive` and `#version 460` are implied; what of the language runs on
+/// all backends stands in docs/writing-shaders.md. Thread-safe; compiles on as many threads as call it.
+///
+/// A cache entry's key holds the text of every file, all definitions and options and the versions of the libraries;
+/// a damaged entry is rebuilt. Includes are found by a scan of the text, so their names cannot come from macros.
 class ShaderCompiler {
   public:
     explicit ShaderCompiler(ShaderCompilerDesc desc);
@@ -59,15 +63,20 @@ class ShaderCompiler {
     /// "path:line: message", path being that of the include where the fault is.
     Expected<ShaderDesc> compile(const ShaderSource& source);
 
-    /// True when a file that `compile` has read for this source has changed since on disk.
+    /// True when a file below the source folder that `compile` has read for this source (whether it succeeded or not)
+    /// has since changed, vanished or come into being. Costs one look at the file system for each file.
     bool is_outdated(const ShaderSource& source) const;
 
-    /// Text of the last preprocessed files that a source depends on, by path.
+    /// Paths of the files that the last `compile` of this source read, the source itself first. Files that are
+    /// included under a false #if count as well.
     std::vector<std::string> dependencies(const ShaderSource& source) const;
 
     struct Statistics {
-        std::uint64_t compiled = 0, from_cache = 0, rebuilt_entries = 0;
-        double compile_ms = 0.0;
+        std::uint64_t compiled = 0;         ///< Times that glslang ran.
+        std::uint64_t from_memory = 0;      ///< Asked for again in this process.
+        std::uint64_t from_cache = 0;       ///< Read from the disk cache.
+        std::uint64_t rebuilt_entries = 0;  ///< Cache entries that held something else than SPIR-V.
+        double compile_ms = 0.0;            ///< Spent in glslang and the optimizer, over all threads.
     };
     [[nodiscard]] Statistics statistics() const;
 
