@@ -4,7 +4,7 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# A target `Name::target` that a part was linked with comes from the package of that name.
+# A target `Name::target` that a part was linked with comes from the package of that name, `Name` or `Name-static` too.
 get_property(NACRE_PACKAGES GLOBAL PROPERTY NACRE_PACKAGES)
 list(REMOVE_DUPLICATES NACRE_PACKAGES)
 list(SORT NACRE_PACKAGES)
