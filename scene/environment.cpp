@@ -104,7 +104,9 @@ Expected<Environment> load_environment(const std::string& path) {
     return result;
 }
 
-Environment studio_environment() {
+namespace {
+
+Environment make_studio() {
     Environment result{.name = "studio", .width = 512, .height = 256};
     result.texels.reserve(std::size_t{result.width} * result.height);
     double weighted_luminance = 0.0;
@@ -123,6 +125,13 @@ Environment studio_environment() {
     const auto to_documented_mean = static_cast<float>(0.5 * weight_sum / weighted_luminance);
     for (glm::vec4& texel : result.texels) texel = glm::vec4(glm::vec3(texel) * to_documented_mean, 1.0f);
     return result;
+}
+
+}  // namespace
+
+Environment studio_environment() {
+    static const Environment studio = make_studio();
+    return studio;
 }
 
 }  // namespace nacre::scene

@@ -146,7 +146,7 @@ class TangentBuilder {
             const Triangle& first = triangles_[seed / 3];
             if (first.degenerate || first.joins_any_group || group_of_[seed] != none) continue;
             const auto group = static_cast<std::uint32_t>(group_tangents_.size());
-            glm::vec3 sum(0.0f);
+            glm::dvec3 sum(0.0);
             pending.assign(1, seed);
             group_of_[seed] = group;
             while (!pending.empty()) {
@@ -164,8 +164,9 @@ class TangentBuilder {
                     pending.push_back(neighbor);
                 });
             }
-            const float length = glm::length(sum);
-            const glm::vec3 tangent = length > 0.0f && std::isfinite(length) ? sum / length : any_perpendicular(normal(seed));
+            // Directions that cancel out leave only rounding, which would not even be perpendicular.
+            const double length = glm::length(sum);
+            const glm::vec3 tangent = length > 1e-9 ? glm::vec3(sum / length) : any_perpendicular(normal(seed));
             group_tangents_.emplace_back(tangent, first.keeps_orientation ? 1.0f : -1.0f);
         }
     }
@@ -183,21 +184,22 @@ class TangentBuilder {
         if (const std::uint32_t other = opposite_[previous(corner)]; other != none) visit(other);
     }
 
-    /// The triangle's u direction in the plane of the vertex normal, times the triangle's angle in that plane.
-    [[nodiscard]] glm::vec3 weighted_direction(std::uint32_t corner) const {
+    /// The triangle's u direction in the plane of the vertex normal, times the triangle's angle in that plane. In
+    /// double precision, so that neither tiny nor huge triangles lose their squares.
+    [[nodiscard]] glm::dvec3 weighted_direction(std::uint32_t corner) const {
         const Triangle& triangle = triangles_[corner / 3];
-        if (triangle.joins_any_group) return glm::vec3(0.0f);
-        const glm::vec3 n = normal(corner);
-        const auto in_plane = [&](const glm::vec3& v) {
-            const glm::vec3 projected = v - n * glm::dot(n, v);
-            const float length = glm::length(projected);
-            return length > std::numeric_limits<float>::min() && std::isfinite(length) ? projected / length
-                                                                                       : glm::vec3(0.0f);
+        if (triangle.joins_any_group) return glm::dvec3(0.0);
+        const glm::dvec3 n(normal(corner));
+        const auto in_plane = [&](const glm::dvec3& v) {
+            const glm::dvec3 projected = v - n * glm::dot(n, v);
+            const double length = glm::length(projected);
+            return length > std::numeric_limits<float>::min() ? projected / length : glm::dvec3(0.0);
         };
-        const glm::vec3 to_next = in_plane(position(next(corner)) - position(corner));
-        const glm::vec3 to_previous = in_plane(position(previous(corner)) - position(corner));
-        const float angle = std::acos(std::clamp(glm::dot(to_next, to_previous), -1.0f, 1.0f));
-        return angle * in_plane(triangle.u_direction);
+        const glm::dvec3 here(position(corner));
+        const glm::dvec3 to_next = in_plane(glm::dvec3(position(next(corner))) - here);
+        const glm::dvec3 to_previous = in_plane(glm::dvec3(position(previous(corner))) - here);
+        const double angle = std::acos(std::clamp(glm::dot(to_next, to_previous), -1.0, 1.0));
+        return angle * in_plane(glm::dvec3(triangle.u_direction));
     }
 
     const Primitive& primitive_;

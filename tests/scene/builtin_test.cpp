@@ -12,7 +12,7 @@ namespace nacre::scene {
 namespace {
 
 TEST(Builtin, EveryNameMakesAValidScene) {
-    ASSERT_GE(builtin_scene_names().size(), 2u);
+    ASSERT_GE(builtin_scene_names().size(), 6u);
     for (const std::string_view name : builtin_scene_names()) {
         SCOPED_TRACE(name);
         const Expected<Scene> scene = load_scene(std::string(name));
@@ -68,6 +68,26 @@ TEST(Builtin, SpheresCoverTheGridAndHaveAllLightKinds) {
     ASSERT_EQ(scene->lights.size(), 3u);
     EXPECT_NE(scene->lights[0].kind, scene->lights[1].kind);
     EXPECT_NE(scene->lights[1].kind, scene->lights[2].kind);
+}
+
+TEST(Builtin, TheGridHasAboutAQuarterOfAMillionTriangles) {
+    const Expected<Scene> scene = make_builtin_scene("builtin:grid250k");
+    ASSERT_TRUE(scene);
+    EXPECT_NEAR(static_cast<double>(triangle_count(*scene)), 250'000.0, 1'000.0);
+}
+
+TEST(Builtin, TheAlphaSceneHasBothAlphaModesAndATexture) {
+    const Expected<Scene> scene = make_builtin_scene("builtin:alpha");
+    ASSERT_TRUE(scene);
+    int masked = 0, blended = 0;
+    for (const auto& material : scene->materials) {
+        masked += material.alpha_mode == materials::AlphaMode::mask;
+        blended += material.alpha_mode == materials::AlphaMode::blend;
+    }
+    EXPECT_GE(masked, 1);
+    EXPECT_GE(blended, 3);
+    ASSERT_FALSE(scene->images.empty());
+    EXPECT_TRUE(scene->images[0].has_alpha);
 }
 
 TEST(Environment, DirectionsAndCoordinatesAreInverse) {
