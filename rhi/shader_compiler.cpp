@@ -106,6 +106,15 @@ std::string preamble_of(std::span<const ShaderDefine> defines) {
     return preamble;
 }
 
+/// Lets an include leave out what only one stage has.
+std::string_view stage_definition(ShaderStage stage) {
+    switch (stage) {
+        case ShaderStage::vertex: return "#define NACRE_VERTEX_STAGE 1\n";
+        case ShaderStage::fragment: return "#define NACRE_FRAGMENT_STAGE 1\n";
+        default: return "#define NACRE_COMPUTE_STAGE 1\n";
+    }
+}
+
 Hash128 identity_of(const ShaderSource& source) {
     Hasher hasher;
     hasher.add(source.path).add(source.text).add(preamble_of(source.defines));
@@ -200,7 +209,7 @@ struct ShaderCompiler::State {
         }
         collection.input.path = *path;
         collection.input.stage = *stage;
-        collection.input.preamble = preamble_of(source.defines);
+        collection.input.preamble = std::string(stage_definition(*stage)) + preamble_of(source.defines);
         collection.input.debug_information = desc.debug_information;
         collection.input.optimize = desc.optimize;
         auto text = source.text.empty() ? find(*path, collection) : std::optional(source.text);
