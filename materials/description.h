@@ -168,7 +168,7 @@ struct MaterialDescription {
     std::optional<Iridescence> iridescence;
     std::optional<DiffuseTransmission> diffuse_transmission;
     std::optional<SpecularGlossiness> specular_glossiness;
-    std::vector<UnknownExtension> other_extensions;  ///< In file order; "extras" under that name.
+    std::vector<UnknownExtension> other_extensions;  ///< By name; "extras" last, under that name.
 };
 
 /// Calls `visit(TextureReference&, bool srgb)` for every texture input of `material` that is present; `srgb` says

@@ -20,7 +20,12 @@ void Bounds::add(const Bounds& other) {
     maximum = glm::max(maximum, other.maximum);
 }
 
-float Bounds::radius() const { return empty() ? 0.0f : glm::length(0.5f * maximum - 0.5f * minimum); }
+float Bounds::radius() const {
+    if (empty()) return 0.0f;
+    // In double precision: the squares of large coordinates are beyond float.
+    const double radius = glm::length(0.5 * glm::dvec3(maximum) - 0.5 * glm::dvec3(minimum));
+    return static_cast<float>(std::min(radius, static_cast<double>(std::numeric_limits<float>::max())));
+}
 
 Bounds Bounds::transformed(const glm::mat4& transform) const {
     Bounds result;
@@ -47,8 +52,13 @@ Bounds world_bounds(const Scene& scene) {
 
 bool is_mirrored(const glm::mat4& transform) { return glm::determinant(glm::mat3(transform)) < 0.0f; }
 
-Camera framing_camera(const Bounds& bounds, float aspect_ratio) {
+Camera framing_camera(const Bounds& scene_bounds, float aspect_ratio) {
     Camera camera{.name = "default"};
+    // Beyond a thousand light years, products of distances would no longer be finite.
+    Bounds bounds = scene_bounds;
+    bounds.minimum = glm::clamp(bounds.minimum, -1e16f, 1e16f);
+    bounds.maximum = glm::clamp(bounds.maximum, -1e16f, 1e16f);
+    if (scene_bounds.empty()) bounds = {};
     const float radius = std::max(bounds.radius(), 1e-4f);
     const glm::vec3 center = bounds.empty() ? glm::vec3(0.0f) : bounds.center();
     const glm::vec3 backward = glm::normalize(glm::vec3(0.3f, 0.25f, 1.0f));
