@@ -98,9 +98,9 @@ function(nacre_add_test name)
   set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
 endfunction()
 
-# nacre_add_fuzzer(<name ending in _fuzz> SOURCES ... USES <part>... [LIBRARIES ...])
-# One libFuzzer program, run by `./run fuzz`; its seeds are the files in tests/seeds/<name>. Nothing without
-# NACRE_BUILD_FUZZERS.
+# nacre_add_fuzzer(<name ending in _fuzzer> SOURCES ... USES <part>... [LIBRARIES ...])
+# One libFuzzer program, run by `./run fuzz`; its seeds are the files in tests/seeds/<name>, its dictionary is <name>.dict
+# beside its source. Nothing without NACRE_BUILD_FUZZERS.
 function(nacre_add_fuzzer name)
   cmake_parse_arguments(ARG "" "" "SOURCES;USES;LIBRARIES" ${ARGN})
   if(NOT NACRE_BUILD_FUZZERS)
