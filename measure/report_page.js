@@ -1,0 +1,68 @@
+// Lays two pictures of the page over each other: drag to move the border, wheel to zoom, F to flip.
+(() => {
+  const stage = document.querySelector('.stage');
+  if (!stage) return;
+  const images = [...document.querySelectorAll('figure img')];
+  const [below, above] = stage.querySelectorAll('img');
+  const tags = stage.querySelectorAll('.tag');
+  const [left, right] = document.querySelectorAll('.controls select');
+  const usable = images.filter(i => i.dataset.viewer === '1');
+  for (const list of [left, right]) for (const image of usable) list.add(new Option(image.dataset.name));
+  right.selectedIndex = Math.min(1, usable.length - 1);
+  let zoom = 1, x = 0, y = 0;
+
+  const show = () => {
+    below.src = usable[left.selectedIndex].src;
+    above.src = usable[right.selectedIndex].src;
+    tags[0].textContent = left.value;
+    tags[1].textContent = right.value;
+  };
+  const place = () => {
+    const box = stage.getBoundingClientRect();
+    x = Math.min(0, Math.max(box.width * (1 - zoom), x));
+    y = Math.min(0, Math.max(box.height * (1 - zoom), y));
+    for (const image of [below, above]) image.style.transform = `translate(${x}px, ${y}px) scale(${zoom})`;
+    stage.classList.toggle('zoomed', zoom > 1);
+  };
+  const divide = event => {
+    const box = stage.getBoundingClientRect();
+    const share = Math.min(1, Math.max(0, (event.clientX - box.left) / box.width));
+    stage.style.setProperty('--at', `${share * 100}%`);
+  };
+  let drag = null;
+  stage.addEventListener('pointerdown', event => {
+    stage.setPointerCapture(event.pointerId);
+    drag = event.shiftKey ? [event.clientX - x, event.clientY - y] : [];
+    if (!drag.length) divide(event);
+  });
+  stage.addEventListener('pointermove', event => {
+    if (!drag) return;
+    if (drag.length) { x = event.clientX - drag[0]; y = event.clientY - drag[1]; place(); } else divide(event);
+  });
+  stage.addEventListener('pointerup', () => { drag = null; });
+  stage.addEventListener('wheel', event => {
+    event.preventDefault();
+    const box = stage.getBoundingClientRect();
+    const before = zoom;
+    zoom = Math.min(32, Math.max(1, zoom * (event.deltaY < 0 ? 1.25 : 0.8)));
+    x += (event.clientX - box.left - x) * (1 - zoom / before);
+    y += (event.clientY - box.top - y) * (1 - zoom / before);
+    place();
+  }, {passive: false});
+  const flip = () => { [left.selectedIndex, right.selectedIndex] = [right.selectedIndex, left.selectedIndex]; show(); };
+  document.querySelector('button.flip').addEventListener('click', flip);
+  document.querySelector('button.reset').addEventListener('click', () => {
+    zoom = 1; x = y = 0; place(); stage.style.setProperty('--at', '50%');
+  });
+  document.addEventListener('keydown', event => { if (event.key === 'f' || event.key === 'F') flip(); });
+  left.addEventListener('change', show);
+  right.addEventListener('change', show);
+  for (const image of images) image.addEventListener('click', () => {
+    const index = usable.indexOf(image);
+    if (index < 0) return;
+    right.selectedIndex = index;
+    show();
+    stage.scrollIntoView({behavior: 'smooth', block: 'center'});
+  });
+  show();
+})();
