@@ -86,6 +86,7 @@ FieldStep compare_field(const BitField& field, std::uint32_t word_a, std::uint32
     switch (field.kind) {
         case FieldKind::uint: step.differs = codes != 0; break;
         case FieldKind::unorm:
+        case FieldKind::squared:
         case FieldKind::ufloat: step.differs = codes > 1; break;
         case FieldKind::snorm:
             step.differs = std::abs(sign_extend(code_a, field.bits) - sign_extend(code_b, field.bits)) > 1;
@@ -192,6 +193,7 @@ std::string_view name_of(FieldKind kind) {
     switch (kind) {
         case FieldKind::uint: return "uint";
         case FieldKind::unorm: return "unorm";
+        case FieldKind::squared: return "squared";
         case FieldKind::snorm: return "snorm";
         case FieldKind::ufloat: return "ufloat";
         case FieldKind::circular: return "circular";
@@ -206,6 +208,10 @@ double decode_field(const BitField& field, std::uint32_t word) {
         case FieldKind::uint:
         case FieldKind::ufloat: return code;
         case FieldKind::unorm: return double(code) / double(mask_of(field.bits));
+        case FieldKind::squared: {
+            const double root = double(code) / double(mask_of(field.bits));
+            return root * root;
+        }
         case FieldKind::snorm:
             return std::max(-1.0, double(sign_extend(code, field.bits)) / double(mask_of(field.bits - 1)));
         case FieldKind::circular: return std::ldexp(double(code), -static_cast<int>(field.bits));

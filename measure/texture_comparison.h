@@ -27,6 +27,7 @@ namespace nacre::measure {
 enum class FieldKind : std::uint8_t {
     uint,          ///< A number or flags: any difference counts.
     unorm,         ///< code / (2^bits - 1); a step is one code.
+    squared,       ///< (code / (2^bits - 1))^2; a step is one code.
     snorm,         ///< Two's complement, code / (2^(bits-1) - 1); a step is one code.
     ufloat,        ///< Unsigned float of any layout, or any code that grows with its value; a step is one code.
     circular,      ///< code / 2^bits of a turn; a step is one code, the last code neighbors the first.

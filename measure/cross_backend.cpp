@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "measure/cross_backend.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+namespace nacre::measure {
+namespace {
+
+using passes::IntermediateDescription;
+
+FieldKind kind_of(passes::FieldKind kind) {
+    switch (kind) {
+        case passes::FieldKind::identifier: return FieldKind::uint;
+        case passes::FieldKind::unorm: return FieldKind::unorm;
+        case passes::FieldKind::squared: return FieldKind::squared;
+        case passes::FieldKind::octahedral: return FieldKind::octahedral;
+    }
+    return FieldKind::uint;
+}
+
+// Backends may store a texture in different formats where a profile leaves it open; its numbers are compared then.
+TextureData as_floats(const TextureData& texture) {
+    TextureData result{.name = texture.name, .format = rhi::Format::rgba32_float, .width = texture.width,
+                       .height = texture.height, .layers = texture.layers};
+    result.bytes.resize(texture.texels() * 16);
+    for (std::uint64_t i = 0; i < texture.texels(); ++i) {
+        double values[4];
+        decode_texel(texture, i, values);
+        float floats[4];
+        for (int c = 0; c < 4; ++c) floats[c] = static_cast<float>(values[c]);
+        std::memcpy(result.bytes.data() + i * 16, floats, 16);
+    }
+    return result;
+}
+
+Expected<TextureDifference> compare_contents(const TextureData& a, const TextureData& b) {
+    if (a.format == b.format) return compare_textures(a, b);
+    return compare_textures(as_floats(a), as_floats(b));
+}
+
+void accumulate(TextureDifference& sum, const TextureDifference& part) {
+    sum.texels += part.texels;
+    sum.differing += part.differing;
+    sum.fields_differing += part.fields_differing;
+    sum.max_abs = std::max(sum.max_abs, part.max_abs);
+    sum.max_rel = std::max(sum.max_rel, part.max_rel);
+    if (sum.fields.empty()) sum.fields = part.fields;
+    else {
+        for (std::size_t f = 0; f < sum.fields.size(); ++f) {
+            sum.fields[f].differing += part.fields[f].differing;
+            sum.fields[f].max_abs = std::max(sum.fields[f].max_abs, part.fields[f].max_abs);
+        }
+    }
+}
+
+// Errors of a device do not know on whose behalf it works.
+Error named(Error error, const std::string& backend) {
+    error.attempted = fmt::format("backend '{}': {}", backend, error.attempted);
+    return error;
+}
+
+// All layers and mips of one texture on two devices.
+Expected<TextureDifference> compare_texture(const Contestant& reference, const Contestant& test,
+                                            const IntermediateDescription& description, bool with_pictures,
+                                            BackendResult& result) {
+    TextureDifference sum{.name = description.name};
+    std::optional<TexturePictures> pictures;
+    for (std::uint32_t mip = 0; mip < description.mips; ++mip) {
+        for (std::uint32_t layer = 0; layer < description.layers; ++layer) {
+            auto a = reference.renderer.read_intermediate(description.name, layer, mip);
+            if (!a) return std::unexpected(named(a.error(), reference.backend));
+            auto b = test.renderer.read_intermediate(description.name, layer, mip);
+            if (!b) return std::unexpected(named(b.error(), test.backend));
+            const TextureData data_a = texture_data_of(*std::move(a));
+            const TextureData data_b = texture_data_of(*std::move(b));
+            NACRE_TRY(const TextureDifference part, compare_contents(data_a, data_b));
+            accumulate(sum, part);
+            if (with_pictures && part.differing > 0 && !pictures && data_a.format == data_b.format) {
+                NACRE_TRY(Image picture, picture_of(data_a));
+                NACRE_TRY(Image mask, difference_mask(data_a, data_b));
+                pictures = TexturePictures{description.name, std::move(picture), std::move(mask)};
+            }
+        }
+    }
+    if (pictures) result.texture_pictures.push_back(*std::move(pictures));
+    return sum;
+}
+
+Expected<void> compare_all_textures(const Contestant& reference, const Contestant& test,
+                                    const ComparisonOptions& options, BackendResult& result) {
+    const std::vector<IntermediateDescription> wanted = reference.renderer.intermediates();
+    const std::vector<IntermediateDescription> present = test.renderer.intermediates();
+    const auto readable = [](const std::vector<IntermediateDescription>& list, const std::string& name) {
+        return std::ranges::any_of(list, [&](const auto& d) { return d.name == name && d.is_readable; });
+    };
+    for (const IntermediateDescription& description : wanted) {
+        if (!description.is_readable) continue;
+        if (!options.only_texture.empty() && description.name != options.only_texture) continue;
+        if (!readable(present, description.name)) {
+            result.missing.push_back(description.name);
+            continue;
+        }
+        NACRE_TRY(TextureDifference difference,
+                  compare_texture(reference, test, description, options.texture_pictures, result));
+        result.textures.push_back(std::move(difference));
+    }
+    for (const IntermediateDescription& description : present) {
+        if (!options.only_texture.empty() && description.name != options.only_texture) continue;
+        if (description.is_readable && !readable(wanted, description.name)) result.added.push_back(description.name);
+    }
+    return {};
+}
+
+Expected<BackendResult> render(const Contestant& contestant, std::uint32_t frames) {
+    BackendResult result{.backend = contestant.backend, .device = contestant.device};
+    auto times = time_frames(contestant.renderer, frames);
+    if (!times) return std::unexpected(named(times.error(), contestant.backend));
+    result.times = *std::move(times);
+    auto picture = contestant.renderer.read_final();
+    if (!picture) return std::unexpected(named(picture.error(), contestant.backend));
+    result.picture = *std::move(picture);
+    result.radiance_scan = scan_values(result.picture.radiance);
+    result.warnings = contestant.renderer.warnings();
+    return result;
+}
+
+double finite(double value) { return std::isinf(value) ? std::numeric_limits<double>::max() : value; }
+
+double share(std::uint64_t part, std::uint64_t whole) { return whole == 0 ? 0.0 : double(part) / double(whole); }
+
+void judge_texture(const std::string& backend, const TextureDifference& texture, const Tolerance& tolerance,
+                   std::vector<std::string>& violations) {
+    TextureTolerance bounds;
+    if (const auto found = tolerance.textures.find(texture.name); found != tolerance.textures.end()) {
+        bounds = found->second;
+    }
+    if (!bounds.fields_differing) bounds.fields_differing = tolerance.fields_differing;
+    const auto judge = [&](std::string_view what, double found, const std::optional<double>& allowed) {
+        // Not "found > allowed": a NaN must not pass.
+        if (!allowed || found <= *allowed) return;
+        violations.push_back(fmt::format("{}: texture '{}': {} is {:.6g}; at most {:.6g} is allowed", backend,
+                                         texture.name, what, found, *allowed));
+    };
+    judge("the share of texels whose fields differ", share(texture.fields_differing, texture.texels),
+          bounds.fields_differing);
+    judge("the share of texels that are not bit-equal", share(texture.differing, texture.texels), bounds.differing);
+    judge("the largest absolute difference", texture.max_abs, bounds.max_abs);
+    judge("the largest relative difference", texture.max_rel, bounds.max_rel);
+}
+
+}  // namespace
+
+TextureData texture_data_of(passes::IntermediateContent content) {
+    const IntermediateDescription& description = content.description;
+    TextureData result{.name = description.name, .format = description.format, .width = content.width,
+                       .height = content.height, .bytes = std::move(content.bytes)};
+    // Depth is handed out as floats, whatever the device stores.
+    if (rhi::info(description.format).has_depth) result.format = rhi::Format::r32_float;
+    for (const passes::Field& field : description.fields) {
+        result.fields.push_back({std::string(field.name), 0, field.shift, field.bits, kind_of(field.kind)});
+    }
+    return result;
+}
+
+Expected<SceneComparison> compare_backends(std::string scene, std::span<const Contestant> contestants,
+                                           const ComparisonOptions& options) {
+    if (contestants.empty()) {
+        return fail(ErrorCode::invalid_argument, "compare backends", scene, "there is no backend to compare");
+    }
+    SceneComparison comparison{.scene = std::move(scene)};
+    for (const Contestant& contestant : contestants) {
+        NACRE_TRY(BackendResult result, render(contestant, options.frames));
+        comparison.backends.push_back(std::move(result));
+        if (&contestant == &contestants.front()) continue;
+        BackendResult& test = comparison.backends.back();
+        if (options.textures) NACRE_CHECK(compare_all_textures(contestants.front(), contestant, options, test));
+        NACRE_TRY(test.final,
+                  compare_pictures(linear_from_srgb_bytes(comparison.backends.front().picture.tone_mapped),
+                                   linear_from_srgb_bytes(test.picture.tone_mapped)));
+    }
+    return comparison;
+}
+
+std::vector<std::string> violations_of(const SceneComparison& comparison, const Tolerance& tolerance) {
+    std::vector<std::string> violations;
+    for (std::size_t b = 0; b < comparison.backends.size(); ++b) {
+        const BackendResult& result = comparison.backends[b];
+        if (!result.radiance_scan.clean()) {
+            violations.push_back(fmt::format("{}: the radiance holds {} NaN, {} infinite and {} negative values",
+                                             result.backend, result.radiance_scan.nan, result.radiance_scan.infinite,
+                                             result.radiance_scan.negative));
+        }
+        if (b == 0) continue;
+        for (const std::string& name : result.missing) {
+            violations.push_back(fmt::format("{}: texture '{}' of the reference is missing", result.backend, name));
+        }
+        for (const std::string& name : result.added) {
+            violations.push_back(fmt::format("{}: texture '{}' is not in the reference", result.backend, name));
+        }
+        for (const TextureDifference& texture : result.textures) {
+            judge_texture(result.backend, texture, tolerance, violations);
+        }
+        const auto judge = [&](std::string_view what, double found, bool is_within, double allowed) {
+            if (is_within) return;
+            violations.push_back(fmt::format("{}: final picture: {} is {:.6g}; the bound is {:.6g}", result.backend,
+                                             what, found, allowed));
+        };
+        const PictureDifference& final = result.final;
+        judge("PSNR in dB", final.psnr_db, final.psnr_db >= tolerance.psnr_db, tolerance.psnr_db);
+        judge("FLIP mean", final.flip_mean, final.flip_mean <= tolerance.flip_mean, tolerance.flip_mean);
+        judge("the share of pixels above 1/255", final.share_above_1, final.share_above_1 <= tolerance.share_above_1,
+              tolerance.share_above_1);
+        if (tolerance.max_abs_8bit) {
+            judge("the largest difference of a byte", final.max_abs_8bit, final.max_abs_8bit <= *tolerance.max_abs_8bit,
+                  *tolerance.max_abs_8bit);
+        }
+    }
+    return violations;
+}
+
+std::string to_json(const SceneComparison& comparison) {
+    using Json = nlohmann::ordered_json;
+    Json results = Json::array();
+    for (std::size_t b = 1; b < comparison.backends.size(); ++b) {
+        const BackendResult& result = comparison.backends[b];
+        Json textures = Json::array();
+        for (const TextureDifference& texture : result.textures) {
+            textures.push_back(Json{{"name", texture.name},
+                                    {"texels", texture.texels},
+                                    {"differing", texture.differing},
+                                    {"fields_differing", texture.fields_differing},
+                                    {"max_abs", finite(texture.max_abs)},
+                                    {"max_rel", finite(texture.max_rel)}});
+        }
+        results.push_back(Json{{"backend", result.backend},
+                               {"textures", std::move(textures)},
+                               {"final",
+                                {{"psnr_db", result.final.psnr_db},
+                                 {"flip_mean", result.final.flip_mean},
+                                 {"max_abs_8bit", result.final.max_abs_8bit},
+                                 {"share_above_1", result.final.share_above_1}}}});
+    }
+    return Json{{"scene", comparison.scene},
+                {"reference", comparison.backends.empty() ? "" : comparison.backends.front().backend},
+                {"results", std::move(results)}}
+               .dump(2, ' ', false, Json::error_handler_t::replace) +
+           "\n";
+}
+
+}  // namespace nacre::measure

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include "samples/nacre/backends.h"
+#include "samples/nacre/commands.h"
+#include "samples/nacre/comparison_run.h"
+#include "samples/nacre/output.h"
+#include "samples/nacre/text_table.h"
+
+namespace nacre::command {
+namespace {
+
+std::string texture_text(const measure::BackendResult& result) {
+    TextTable table({"texture", "texels", "not equal", "fields off", "largest", "relative"});
+    for (const measure::TextureDifference& texture : result.textures) {
+        table.add({texture.name, fmt::format("{}", texture.texels), fmt::format("{}", texture.differing),
+                   texture.fields.empty() ? "-" : fmt::format("{}", texture.fields_differing),
+                   figure_text(texture.max_abs), figure_text(texture.max_rel)});
+    }
+    return table.text();
+}
+
+std::string summary(const measure::SceneComparison& comparison) {
+    TextTable table({"backend", "device", "ms", "PSNR dB", "FLIP mean", "max byte", "above 1/255"});
+    for (std::size_t b = 0; b < comparison.backends.size(); ++b) {
+        const measure::BackendResult& result = comparison.backends[b];
+        std::vector<std::string> row = {result.backend, result.device, fmt::format("{:.2f}", result.times.median_ms)};
+        if (b == 0) {
+            row.insert(row.end(), {"-", "-", "-", "-"});
+        } else {
+            row.insert(row.end(), {fmt::format("{:.2f}", result.final.psnr_db), figure_text(result.final.flip_mean),
+                                   fmt::format("{}", result.final.max_abs_8bit), share_text(result.final.share_above_1)});
+        }
+        table.add(std::move(row));
+    }
+    return table.text();
+}
+
+}  // namespace
+
+Outcome run(const CompareArguments& arguments) {
+    NACRE_TRY(const measure::Tolerance tolerance, read_tolerance(arguments.tolerance));
+    NACRE_TRY(const SceneSession scene, SceneSession::open(arguments.scene));
+    const auto instance = make_instance();
+    NACRE_TRY(const measure::SceneComparison comparison,
+              run_comparison(scene, *instance, arguments.scene.backends,
+                             {.frames = arguments.scene.frames,
+                              .only_texture = arguments.scene.dump,
+                              .texture_pictures = !arguments.output.empty()}));
+    const std::vector<std::string> violations = measure::violations_of(comparison, tolerance);
+
+    std::string text;
+    for (const measure::BackendResult& result : comparison.backends) {
+        if (result.textures.empty()) continue;
+        text += fmt::format("{} against {}\n{}\n", result.backend, comparison.backends.front().backend,
+                            texture_text(result));
+    }
+    text += summary(comparison);
+    for (const std::string& violation : violations) text += fmt::format("over the tolerance: {}\n", violation);
+    if (violations.empty()) text += "The backends agree within the tolerance.\n";
+    if (!arguments.output.empty()) {
+        NACRE_CHECK(write_comparison(arguments.output, arguments.scene, comparison, violations));
+        text += fmt::format("Pictures and page: {}/index.html\n", arguments.output);
+    }
+    print_result(arguments.scene.json, text);
+    NACRE_CHECK(write_json(arguments.scene.json, measure::to_json(comparison)));
+    return violations.empty() ? ExitCode::success : ExitCode::over_tolerance;
+}
+
+}  // namespace nacre::command
