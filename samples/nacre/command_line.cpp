@@ -153,6 +153,34 @@ CLI::Validator file_ending(std::vector<std::string> endings) {
             "", ""};
 }
 
+// "vulkan,gl" to its members.
+std::vector<std::string> split_backends(const std::string& list) {
+    std::vector<std::string> backends;
+    for (std::size_t start = 0; start <= list.size();) {
+        const std::size_t end = std::min(list.find(',', start), list.size());
+        backends.push_back(list.substr(start, end - start));
+        start = end + 1;
+    }
+    if (backends.size() < 2 || std::ranges::any_of(backends, &std::string::empty)) {
+        throw CLI::ValidationError(
+            "--backends", fmt::format("'{}' is not a list of two or more backends, as in vulkan,gl", list));
+    }
+    return backends;
+}
+
+// A whole number in a range; says what was expected, and keeps the help text short.
+CLI::Validator whole_number(std::uint32_t smallest, std::uint32_t largest) {
+    return {[=](std::string& text) -> std::string {
+                std::uint32_t value = 0;
+                const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+                if (error == std::errc{} && end == text.data() + text.size() && value >= smallest && value <= largest) {
+                    return {};
+                }
+                return fmt::format("'{}' is not a whole number from {} to {}", text, smallest, largest);
+            },
+            "", ""};
+}
+
 void add_json(CLI::App& app, std::string& json) {
     app.add_option("--json", json, "Write the results as JSON to FILE; \"-\": standard output, instead of the text")
         ->type_name("FILE");
@@ -177,7 +205,7 @@ void add_backend(CLI::App& app, SceneArguments& arguments) {
 void add_device(CLI::App& app, SceneArguments& arguments) {
     app.add_option("-d,--device", arguments.device, "Which device of the backend, by number (see `nacre devices`)")
         ->type_name("N")
-        ->check(CLI::Range(0, 1023))
+        ->check(whole_number(0, 1023))
         ->group("Device");
     app.add_option("-p,--profile", arguments.profile,
                    fmt::format("Budget for the picture: {}; default high", join(profile_names())))
@@ -231,7 +259,7 @@ void add_output_options(CLI::App& app, SceneArguments& arguments, const std::str
     app.add_option("-n,--frames", arguments.frames,
                    "Frames to time; with more than 1 a first one is rendered that is not counted")
         ->type_name("N")
-        ->check(CLI::Range(1, 100000))
+        ->check(whole_number(1, 100000))
         ->group("Output");
     app.add_option("--dump", arguments.dump, dump_meaning)->type_name("TEXTURE")->group("Output");
 }
@@ -259,7 +287,7 @@ struct Definition {
     Definition() {
         app.footer(main_footer);
         app.set_version_flag("--version", std::string("nacre " NACRE_VERSION));
-        app.require_subcommand(1);
+        app.require_subcommand(0, 1);
         app.get_formatter()->column_width(34);
 
         CLI::App* command = app.add_subcommand("devices", "List the devices of all backends");
@@ -286,12 +314,12 @@ struct Definition {
         command->footer(compare_footer + scene_names());
         add_scene(*command, compare.scene);
         command
-            ->add_option("-b,--backends", compare.scene.backends,
-                         fmt::format("Two or more of {}, separated by commas, each as NAME[:MODE][:lanes=N]"
-                                     "[:threads=N]; the first is the reference",
-                                     join(backend_names())))
+            ->add_option_function<std::string>(
+                "-b,--backends", [this](const std::string& list) { compare.scene.backends = split_backends(list); },
+                fmt::format("Two or more of {}, separated by commas, each as NAME[:MODE][:lanes=N][:threads=N]; the "
+                            "first is the reference",
+                            join(backend_names())))
             ->type_name("LIST")
-            ->delimiter(',')
             ->required()
             ->group("Device");
         command->add_option("-o,--output", compare.output, "Write pictures, differences and index.html to this folder")
@@ -338,7 +366,7 @@ struct Definition {
         add_picture(*command, demo.scene);
         command->add_option("-n,--frames", demo.scene.frames, "Frames to time, after a first one; default 3")
             ->type_name("N")
-            ->check(CLI::Range(1, 100000))
+            ->check(whole_number(1, 100000))
             ->group("Output");
         add_json(*command, demo.scene.json);
 
@@ -432,9 +460,8 @@ std::variant<Invocation, int> parse_command_line(int argc, const char* const* ar
         fmt::print(stderr, "nacre: {}\n`{} --help` tells what can be written here.\n", error.what(), command);
         return static_cast<int>(ExitCode::usage);
     }
-    if (definition.app.get_subcommands().front()->get_name() == "compare" &&
-        definition.compare.scene.backends.size() < 2) {
-        fmt::print(stderr, "nacre: --backends: name two or more, as in --backends vulkan,gl\n");
+    if (definition.app.get_subcommands().empty()) {
+        fmt::print(stderr, "nacre: a command is required\n`nacre --help` tells what can be written here.\n");
         return static_cast<int>(ExitCode::usage);
     }
     return definition.invocation();
@@ -450,8 +477,10 @@ std::vector<std::string> completion_candidates(const std::vector<std::string>& w
         candidates.emplace_back("--version");
         return candidates;
     }
-    const CLI::App* command = definition.app.get_subcommand_no_throw(words.front());
-    if (!command) return {};
+    const auto commands = definition.app.get_subcommands(nullptr);
+    const auto found = std::ranges::find(commands, words.front(), [](const CLI::App* app) { return app->get_name(); });
+    if (found == commands.end()) return {};
+    const CLI::App* command = *found;
     const std::string& previous = words[words.size() - 2];
     if (words.size() > 2 && previous.starts_with("-")) {
         const CLI::Option* option = command->get_option_no_throw(previous);

@@ -166,7 +166,7 @@ Outcome run(const DiffArguments& arguments) {
         arguments.tolerance.empty() ? std::vector<std::string>{} : judge(difference, tolerance);
     for (const std::string& violation : violations) text += fmt::format("over the tolerance: {}\n", violation);
     if (!arguments.output.empty()) {
-        NACRE_CHECK(write_page(arguments.output, a, b, difference));
+        NACRE_CHECK(write_page(arguments, a, b, difference));
         text += fmt::format("Pictures and page: {}/index.html\n", arguments.output);
     }
     print_result(arguments.json, text);
