@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
 #include <mutex>
 #include <string>
-
-#include <fmt/format.h>
 
 #include "backends/vulkan/device.h"
 #include "backends/vulkan/instance.h"
@@ -28,7 +28,8 @@ class Backend final : public rhi::Backend {
         NACRE_TRY(const std::shared_ptr<const Instance> instance, shared_instance());
         NACRE_TRY(const auto devices, PhysicalDevice::list(*instance));
         std::vector<rhi::AdapterInfo> result;
-        for (const auto& device : devices) result.push_back(device->describe(static_cast<std::uint32_t>(result.size())));
+        for (const auto& device : devices)
+            result.push_back(device->describe(static_cast<std::uint32_t>(result.size())));
         return result;
     }
 
@@ -56,7 +57,8 @@ class Backend final : public rhi::Backend {
         return library();
     }
 
-    /// The instance of all devices without driver validation. Kept as long as the backend: making one loads all drivers.
+    /// The instance of all devices without driver validation. Kept as long as the backend: making one loads all
+    /// drivers.
     Expected<std::shared_ptr<const Instance>> shared_instance() {
         const std::lock_guard lock(mutex_);
         if (!instance_) {

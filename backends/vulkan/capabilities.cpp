@@ -129,8 +129,7 @@ std::vector<const char*> choose_features(const PhysicalDevice& device, bool dyna
     return extensions;
 }
 
-rhi::Capabilities capabilities_of(const Instance& instance, const PhysicalDevice& device,
-                                  const FeatureChain& enabled) {
+rhi::Capabilities capabilities_of(const Instance& instance, const PhysicalDevice& device, const FeatureChain& enabled) {
     const VkPhysicalDeviceFeatures& features = enabled.core.features;
     const VkPhysicalDeviceVulkan12Features& vulkan12 = enabled.vulkan12;
     const VkPhysicalDeviceLimits& limits = device.properties.limits;
@@ -152,9 +151,9 @@ rhi::Capabilities capabilities_of(const Instance& instance, const PhysicalDevice
     result.indirect_first_instance = features.drawIndirectFirstInstance;
     result.timestamps = device.timestamp_valid_bits > 0;
     result.precise_occlusion = features.occlusionQueryPrecise;
-    constexpr VkSubgroupFeatureFlags subgroup_needed =
-        VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_VOTE_BIT | VK_SUBGROUP_FEATURE_ARITHMETIC_BIT |
-        VK_SUBGROUP_FEATURE_BALLOT_BIT | VK_SUBGROUP_FEATURE_SHUFFLE_BIT;
+    constexpr VkSubgroupFeatureFlags subgroup_needed = VK_SUBGROUP_FEATURE_BASIC_BIT | VK_SUBGROUP_FEATURE_VOTE_BIT |
+                                                       VK_SUBGROUP_FEATURE_ARITHMETIC_BIT |
+                                                       VK_SUBGROUP_FEATURE_BALLOT_BIT | VK_SUBGROUP_FEATURE_SHUFFLE_BIT;
     result.subgroup_operations = (device.vulkan11.subgroupSupportedStages & VK_SHADER_STAGE_COMPUTE_BIT) &&
                                  (device.vulkan11.subgroupSupportedOperations & subgroup_needed) == subgroup_needed;
     result.shader_float64 = features.shaderFloat64;
@@ -176,8 +175,7 @@ rhi::Capabilities capabilities_of(const Instance& instance, const PhysicalDevice
     result.max_dual_source_targets = features.dualSrcBlend ? limits.maxFragmentDualSrcAttachments : 0;
     const VkSampleCountFlags samples = limits.framebufferColorSampleCounts & limits.framebufferDepthSampleCounts;
     result.max_samples = samples & VK_SAMPLE_COUNT_4_BIT ? 4 : 1;
-    result.max_integer_samples =
-        device.vulkan12.framebufferIntegerColorSampleCounts & VK_SAMPLE_COUNT_4_BIT ? 4 : 1;
+    result.max_integer_samples = device.vulkan12.framebufferIntegerColorSampleCounts & VK_SAMPLE_COUNT_4_BIT ? 4 : 1;
     result.max_bind_groups = std::min(limits.maxBoundDescriptorSets, 8u);
     result.max_push_constant_bytes = std::min(limits.maxPushConstantsSize, 256u);
     result.max_uniform_buffer_range = limits.maxUniformBufferRange;
@@ -209,14 +207,14 @@ rhi::Capabilities capabilities_of(const Instance& instance, const PhysicalDevice
     result.subgroup_size = result.subgroup_operations ? device.vulkan11.subgroupSize : 0;
     if (result.descriptor_indexing)
         // With update-after-bind the larger of the two sets of limits counts; 2^20 is more than any table needs.
-        result.max_bindless_textures = std::min(
-            vulkan12.descriptorBindingSampledImageUpdateAfterBind
-                ? std::min({device.vulkan12.maxPerStageDescriptorUpdateAfterBindSampledImages,
-                            device.vulkan12.maxPerStageDescriptorUpdateAfterBindSamplers,
-                            device.vulkan12.maxDescriptorSetUpdateAfterBindSampledImages,
-                            device.vulkan12.maxDescriptorSetUpdateAfterBindSamplers})
-                : std::min(limits.maxPerStageDescriptorSampledImages, limits.maxPerStageDescriptorSamplers),
-            1u << 20);
+        result.max_bindless_textures =
+            std::min(vulkan12.descriptorBindingSampledImageUpdateAfterBind
+                         ? std::min({device.vulkan12.maxPerStageDescriptorUpdateAfterBindSampledImages,
+                                     device.vulkan12.maxPerStageDescriptorUpdateAfterBindSamplers,
+                                     device.vulkan12.maxDescriptorSetUpdateAfterBindSampledImages,
+                                     device.vulkan12.maxDescriptorSetUpdateAfterBindSamplers})
+                         : std::min(limits.maxPerStageDescriptorSampledImages, limits.maxPerStageDescriptorSamplers),
+                     1u << 20);
     result.max_anisotropy = features.samplerAnisotropy ? limits.maxSamplerAnisotropy : 1.0f;
     result.max_line_width = 1.0f;
     result.max_point_size = features.largePoints ? limits.pointSizeRange[1] : 1.0f;

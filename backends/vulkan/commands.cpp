@@ -133,17 +133,15 @@ void Commands::bind_dirty_groups() {
             sets[count++] = groups_[i]->handle;
         }
         if (count > 0)
-            vk_.CmdBindDescriptorSets(
-                commands_, in_pass_ ? VK_PIPELINE_BIND_POINT_GRAPHICS : VK_PIPELINE_BIND_POINT_COMPUTE,
-                pipeline_->layout, first, count, sets, 0, nullptr);
+            vk_.CmdBindDescriptorSets(commands_,
+                                      in_pass_ ? VK_PIPELINE_BIND_POINT_GRAPHICS : VK_PIPELINE_BIND_POINT_COMPUTE,
+                                      pipeline_->layout, first, count, sets, 0, nullptr);
     }
 }
 
 void Commands::visit(const rhi::CommandHeader& header, const std::byte* payload, const rhi::CommandStream& stream) {
     using enum rhi::CommandType;
-    const auto as = [&]<typename T>(std::type_identity<T>) -> const T& {
-        return *reinterpret_cast<const T*>(payload);
-    };
+    const auto as = [&]<typename T>(std::type_identity<T>) -> const T& { return *reinterpret_cast<const T*>(payload); };
 #define NACRE_AS(Type) as(std::type_identity<rhi::Type>{})
     switch (header.type) {
         case set_bind_group: {
@@ -189,10 +187,12 @@ void Commands::visit(const rhi::CommandHeader& header, const std::byte* payload,
             break;
         }
         case set_graphics_pipeline:
-            set_pipeline(static_cast<const GraphicsPipeline*>(NACRE_AS(SetGraphicsPipelineCommand).pipeline.object)->core);
+            set_pipeline(
+                static_cast<const GraphicsPipeline*>(NACRE_AS(SetGraphicsPipelineCommand).pipeline.object)->core);
             break;
         case set_compute_pipeline:
-            set_pipeline(static_cast<const ComputePipeline*>(NACRE_AS(SetComputePipelineCommand).pipeline.object)->core);
+            set_pipeline(
+                static_cast<const ComputePipeline*>(NACRE_AS(SetComputePipelineCommand).pipeline.object)->core);
             break;
         case set_vertex_buffer: {
             const auto& command = NACRE_AS(SetVertexBufferCommand);

@@ -33,7 +33,7 @@ struct Context {
     rhi::FaultInjection faults;
     std::function<void(const rhi::Message&)> report;
 
-    bool dynamic_rendering = false;   ///< In use, not merely present.
+    bool dynamic_rendering = false;  ///< In use, not merely present.
     bool synchronization2 = false;
     bool null_descriptors = false;
     bool debug_names = false;

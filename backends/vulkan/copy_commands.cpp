@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-
 #include <fmt/format.h>
+
+#include <algorithm>
 
 #include "backends/vulkan/buffer.h"
 #include "backends/vulkan/commands.h"
@@ -68,8 +68,8 @@ void Commands::clear(const rhi::ClearTextureCommand& command) {
     VkClearColorValue value;
     std::ranges::copy(command.color.uint, value.uint32);
     const VkImageSubresourceRange range = range_of(command.view, VK_IMAGE_ASPECT_COLOR_BIT);
-    vk_.CmdClearColorImage(commands_, native(*command.view.texture.object).handle,
-                           VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &value, 1, &range);
+    vk_.CmdClearColorImage(commands_, native(*command.view.texture.object).handle, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+                           &value, 1, &range);
 }
 
 void Commands::clear(const rhi::ClearDepthStencilCommand& command) {
@@ -87,10 +87,9 @@ void Commands::generate_mips(Texture& texture) {
                                                             &facts);
     constexpr VkFormatFeatureFlags needed = VK_FORMAT_FEATURE_BLIT_SRC_BIT | VK_FORMAT_FEATURE_BLIT_DST_BIT;
     if ((facts.optimalTilingFeatures & needed) != needed)
-        return fail_with(nacre::fail(
-            ErrorCode::unsupported, "generate mips of", "texture " + in_quotes(desc.name),
-            fmt::format("this device cannot scale format {}", rhi::info(desc.format).name),
-            "Fill the mips with Device::write_texture, or use another format."));
+        return fail_with(nacre::fail(ErrorCode::unsupported, "generate mips of", "texture " + in_quotes(desc.name),
+                                     fmt::format("this device cannot scale format {}", rhi::info(desc.format).name),
+                                     "Fill the mips with Device::write_texture, or use another format."));
     const bool is_linear = (facts.optimalTilingFeatures & VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT) &&
                            !rhi::info(desc.format).is_integer() && !rhi::info(desc.format).is_depth_stencil();
     const std::uint32_t layers = desc.dimension == rhi::TextureDimension::d3 ? 1 : desc.layers;

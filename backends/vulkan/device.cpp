@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/vulkan/device.h"
 
-#include <algorithm>
-
 #include <fmt/format.h>
+
+#include <algorithm>
 
 #include "backends/vulkan/buffer.h"
 #include "backends/vulkan/capabilities.h"
@@ -69,9 +69,8 @@ Expected<void> Device::create_native(const rhi::DeviceDesc& desc) {
     context_.null_descriptors = enabled.robustness2.nullDescriptor;
     context_.update_after_bind = enabled.vulkan12.descriptorBindingSampledImageUpdateAfterBind;
     context_.capabilities = capabilities_of(*context_.instance, *context_.physical, enabled);
-    context_.push_constants = {
-        VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT | VK_SHADER_STAGE_COMPUTE_BIT, 0,
-        context_.capabilities.max_push_constant_bytes};
+    context_.push_constants = {VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT | VK_SHADER_STAGE_COMPUTE_BIT,
+                               0, context_.capabilities.max_push_constant_bytes};
 
     VkSemaphoreTypeCreateInfo type{VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO};
     type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;

@@ -7,6 +7,7 @@ namespace nacre::vulkan {
 namespace {
 
 // In the order of rhi::Format.
+// clang-format off
 constexpr std::array<VkFormat, rhi::format_count> formats{
     VK_FORMAT_UNDEFINED,
     VK_FORMAT_R8_UNORM, VK_FORMAT_R8_SNORM, VK_FORMAT_R8_UINT, VK_FORMAT_R8_SINT,
@@ -30,6 +31,7 @@ constexpr std::array<VkFormat, rhi::format_count> formats{
     VK_FORMAT_BC4_UNORM_BLOCK, VK_FORMAT_BC4_SNORM_BLOCK, VK_FORMAT_BC5_UNORM_BLOCK, VK_FORMAT_BC5_SNORM_BLOCK,
     VK_FORMAT_BC6H_UFLOAT_BLOCK, VK_FORMAT_BC6H_SFLOAT_BLOCK, VK_FORMAT_BC7_UNORM_BLOCK, VK_FORMAT_BC7_SRGB_BLOCK,
 };
+// clang-format on
 
 }  // namespace
 

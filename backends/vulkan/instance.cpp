@@ -77,7 +77,8 @@ Expected<std::shared_ptr<const Instance>> Instance::create(std::shared_ptr<const
     VkDebugUtilsMessengerCreateInfoEXT messenger{VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT};
     messenger.messageSeverity =
         VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT;
-    messenger.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_GENERAL_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
+    messenger.messageType =
+        VK_DEBUG_UTILS_MESSAGE_TYPE_GENERAL_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
     messenger.pfnUserCallback = receive_message;
     messenger.pUserData = &instance->options_;
 
@@ -110,8 +111,8 @@ Expected<std::shared_ptr<const Instance>> Instance::create(std::shared_ptr<const
         return fail(result, "create Vulkan instance", library->file.name());
     }
     // Without this function the instance could not be destroyed, whatever else is missing.
-    instance->vk.DestroyInstance = reinterpret_cast<PFN_vkDestroyInstance>(
-        global.GetInstanceProcAddr(instance->handle_, "vkDestroyInstance"));
+    instance->vk.DestroyInstance =
+        reinterpret_cast<PFN_vkDestroyInstance>(global.GetInstanceProcAddr(instance->handle_, "vkDestroyInstance"));
     NACRE_TRY(instance->vk, InstanceFunctions::load(global, instance->handle_));
     if (instance->options_.validation && instance->vk.CreateDebugUtilsMessengerEXT) {
         messenger.pNext = nullptr;

@@ -16,13 +16,12 @@ std::unexpected<Error> missing_function(const char* name) {
 
 Expected<InstanceFunctions> InstanceFunctions::load(const GlobalFunctions& global, VkInstance instance) {
     InstanceFunctions result;
-#define NACRE_LOAD(name)                                                                                \
-    result.name = reinterpret_cast<PFN_vk##name>(global.GetInstanceProcAddr(instance, "vk" #name));     \
+#define NACRE_LOAD(name)                                                                            \
+    result.name = reinterpret_cast<PFN_vk##name>(global.GetInstanceProcAddr(instance, "vk" #name)); \
     if (!result.name) return missing_function("vk" #name);
     NACRE_VULKAN_INSTANCE_FUNCTIONS(NACRE_LOAD)
 #undef NACRE_LOAD
-#define NACRE_LOAD(name) \
-    result.name = reinterpret_cast<PFN_vk##name>(global.GetInstanceProcAddr(instance, "vk" #name));
+#define NACRE_LOAD(name) result.name = reinterpret_cast<PFN_vk##name>(global.GetInstanceProcAddr(instance, "vk" #name));
     NACRE_VULKAN_OPTIONAL_INSTANCE_FUNCTIONS(NACRE_LOAD)
 #undef NACRE_LOAD
     return result;
@@ -30,19 +29,18 @@ Expected<InstanceFunctions> InstanceFunctions::load(const GlobalFunctions& globa
 
 Expected<DeviceFunctions> DeviceFunctions::load(const InstanceFunctions& functions, VkDevice device) {
     DeviceFunctions result;
-#define NACRE_LOAD(name)                                                                          \
+#define NACRE_LOAD(name)                                                                           \
     result.name = reinterpret_cast<PFN_vk##name>(functions.GetDeviceProcAddr(device, "vk" #name)); \
     if (!result.name) return missing_function("vk" #name);
     NACRE_VULKAN_DEVICE_FUNCTIONS(NACRE_LOAD)
 #undef NACRE_LOAD
-#define NACRE_LOAD(name)                                                                              \
-    result.name = reinterpret_cast<PFN_vk##name>(functions.GetDeviceProcAddr(device, "vk" #name));    \
-    if (!result.name)                                                                                 \
+#define NACRE_LOAD(name)                                                                           \
+    result.name = reinterpret_cast<PFN_vk##name>(functions.GetDeviceProcAddr(device, "vk" #name)); \
+    if (!result.name)                                                                              \
         result.name = reinterpret_cast<PFN_vk##name>(functions.GetDeviceProcAddr(device, "vk" #name "KHR"));
     NACRE_VULKAN_PROMOTED_DEVICE_FUNCTIONS(NACRE_LOAD)
 #undef NACRE_LOAD
-#define NACRE_LOAD(name) \
-    result.name = reinterpret_cast<PFN_vk##name>(functions.GetDeviceProcAddr(device, "vk" #name));
+#define NACRE_LOAD(name) result.name = reinterpret_cast<PFN_vk##name>(functions.GetDeviceProcAddr(device, "vk" #name));
     NACRE_VULKAN_OPTIONAL_DEVICE_FUNCTIONS(NACRE_LOAD)
 #undef NACRE_LOAD
     return result;
@@ -54,8 +52,8 @@ Expected<std::shared_ptr<const Library>> Library::open() {
               DynamicLibrary::open({"libvulkan.so.1", "libvulkan.so"}, "libvulkan1", LibraryLifetime::resident));
     NACRE_TRY(library->vk.GetInstanceProcAddr,
               library->file.symbol<PFN_vkGetInstanceProcAddr>("vkGetInstanceProcAddr"));
-#define NACRE_LOAD(name)                                                                                       \
-    library->vk.name = reinterpret_cast<PFN_vk##name>(library->vk.GetInstanceProcAddr(nullptr, "vk" #name));   \
+#define NACRE_LOAD(name)                                                                                     \
+    library->vk.name = reinterpret_cast<PFN_vk##name>(library->vk.GetInstanceProcAddr(nullptr, "vk" #name)); \
     if (!library->vk.name) return missing_function("vk" #name);
     NACRE_VULKAN_GLOBAL_FUNCTIONS(NACRE_LOAD)
 #undef NACRE_LOAD

@@ -10,8 +10,8 @@
 #include "core/error.h"
 
 /// @file
-/// The Vulkan library, opened at run time, and its functions in tables: one of the library, one for each VkInstance, one
-/// for each VkDevice (which skips the loader's dispatch).
+/// The Vulkan library, opened at run time, and its functions in tables: one of the library, one for each VkInstance,
+/// one for each VkDevice (which skips the loader's dispatch).
 ///
 ///     NACRE_TRY(std::shared_ptr<const Library> library, Library::open());
 ///     library->vk.CreateInstance(...);
@@ -20,10 +20,10 @@
 
 namespace nacre::vulkan {
 
-#define NACRE_VULKAN_GLOBAL_FUNCTIONS(X) \
-    X(EnumerateInstanceVersion)          \
+#define NACRE_VULKAN_GLOBAL_FUNCTIONS(X)    \
+    X(EnumerateInstanceVersion)             \
     X(EnumerateInstanceExtensionProperties) \
-    X(EnumerateInstanceLayerProperties)  \
+    X(EnumerateInstanceLayerProperties)     \
     X(CreateInstance)
 
 #define NACRE_VULKAN_INSTANCE_FUNCTIONS(X)    \

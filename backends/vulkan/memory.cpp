@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/vulkan/memory.h"
 
-#include <algorithm>
-
 #include <fmt/format.h>
+
+#include <algorithm>
 
 #include "backends/vulkan/result.h"
 
@@ -119,9 +119,8 @@ std::vector<std::uint32_t> MemoryAllocator::candidate_types(const MemoryRequest&
             break;
     }
     // Lazily allocated and protected memory are for purposes that Nacre does not have; vendor bits likewise.
-    constexpr VkMemoryPropertyFlags known =
-        VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT | VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT |
-        VK_MEMORY_PROPERTY_HOST_COHERENT_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
+    constexpr VkMemoryPropertyFlags known = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT | VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT |
+                                            VK_MEMORY_PROPERTY_HOST_COHERENT_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
     const VkPhysicalDeviceMemoryProperties& memory = context_.physical->memory;
     std::vector<std::pair<int, std::uint32_t>> ranked;
     for (std::uint32_t type = 0; type < memory.memoryTypeCount; ++type) {
@@ -145,11 +144,11 @@ Expected<Memory> MemoryAllocator::allocate(const MemoryRequest& request) {
                            "no memory type of this device serves it", "Use another memory kind or format.");
     const std::uint32_t heap = memory.memoryTypes[types.front()].heapIndex;
     const auto out_of_memory = [&](std::string_view reason) {
-        return nacre::fail(ErrorCode::out_of_memory, "allocate memory", request.subject,
-                           fmt::format("{} bytes do not fit into heap {} of {} bytes ({}; {} bytes are reserved)",
-                                       request.requirements.size, heap, memory.memoryHeaps[heap].size, reason,
-                                       reserved_bytes_),
-                           "Destroy objects or use smaller ones.");
+        return nacre::fail(
+            ErrorCode::out_of_memory, "allocate memory", request.subject,
+            fmt::format("{} bytes do not fit into heap {} of {} bytes ({}; {} bytes are reserved)",
+                        request.requirements.size, heap, memory.memoryHeaps[heap].size, reason, reserved_bytes_),
+            "Destroy objects or use smaller ones.");
     };
     if (++allocation_count_ == context_.faults.fail_allocation) return out_of_memory("planted by fault injection");
     // Drivers differ in what they do with sizes beyond any heap; some only find out when the memory is touched.

@@ -50,11 +50,11 @@ class Memory {
 struct MemoryRequest {
     VkMemoryRequirements requirements{};
     rhi::MemoryKind kind = rhi::MemoryKind::device;
-    bool is_image = false;             ///< With optimal tiling.
-    bool prefers_dedicated = false;    ///< The driver wants memory of its own for this object,
+    bool is_image = false;                       ///< With optimal tiling.
+    bool prefers_dedicated = false;              ///< The driver wants memory of its own for this object,
     VkBuffer dedicated_buffer = VK_NULL_HANDLE;  ///< which is this
     VkImage dedicated_image = VK_NULL_HANDLE;    ///< or this.
-    std::string subject;               ///< For errors: "buffer 'vertices'".
+    std::string subject;                         ///< For errors: "buffer 'vertices'".
 };
 
 class MemoryAllocator {
@@ -88,8 +88,8 @@ class MemoryAllocator {
     std::uint64_t allocation_count_ = 0;  ///< Calls of `allocate`, for fault injection.
     std::uint64_t reserved_bytes_ = 0;
     std::uint32_t driver_allocations_ = 0;
-    bool separate_images_ = false;        ///< Images and buffers must not be neighbors.
-    std::vector<Pool> pools_;             ///< Two for each memory type: for buffers and for images.
+    bool separate_images_ = false;  ///< Images and buffers must not be neighbors.
+    std::vector<Pool> pools_;       ///< Two for each memory type: for buffers and for images.
     std::vector<std::unique_ptr<MemoryBlock>> dedicated_;
 };
 

@@ -61,8 +61,8 @@ void Commands::begin_dynamic_rendering(const rhi::BeginRenderPassCommand& comman
         if (!resolve) return fail_with(std::unexpected(std::move(resolve).error()));
         color.resolveImageView = *resolve;
         color.resolveImageLayout = VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL;
-        color.resolveMode = rhi::info(from.view.format).is_integer() ? VK_RESOLVE_MODE_SAMPLE_ZERO_BIT
-                                                                     : VK_RESOLVE_MODE_AVERAGE_BIT;
+        color.resolveMode =
+            rhi::info(from.view.format).is_integer() ? VK_RESOLVE_MODE_SAMPLE_ZERO_BIT : VK_RESOLVE_MODE_AVERAGE_BIT;
     }
     VkRenderingInfo info{VK_STRUCTURE_TYPE_RENDERING_INFO};
     info.renderArea = {{0, 0}, {command.width, command.height}};

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/vulkan/physical_device.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <optional>
 #include <utility>
-
-#include <fmt/format.h>
 
 #include "backends/vulkan/result.h"
 #include "core/log.h"
@@ -123,9 +123,9 @@ rhi::AdapterInfo PhysicalDevice::describe(std::uint32_t index) const {
             .index = index,
             .name = properties.deviceName,
             .driver = fmt::format("{} {}", vulkan12.driverName, vulkan12.driverInfo),
-            .api_version = fmt::format("Vulkan {}.{}.{}", VK_API_VERSION_MAJOR(properties.apiVersion),
-                                       VK_API_VERSION_MINOR(properties.apiVersion),
-                                       VK_API_VERSION_PATCH(properties.apiVersion)),
+            .api_version =
+                fmt::format("Vulkan {}.{}.{}", VK_API_VERSION_MAJOR(properties.apiVersion),
+                            VK_API_VERSION_MINOR(properties.apiVersion), VK_API_VERSION_PATCH(properties.apiVersion)),
             .is_software = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU};
 }
 

@@ -10,7 +10,8 @@
 
 namespace nacre::vulkan {
 
-/// Feature structures in one chain, as they are queried and as they are enabled. Not copyable: the chain holds addresses.
+/// Feature structures in one chain, as they are queried and as they are enabled. Not copyable: the chain holds
+/// addresses.
 struct FeatureChain {
     VkPhysicalDeviceFeatures2 core{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2};
     VkPhysicalDeviceVulkan11Features vulkan11{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES};
@@ -31,8 +32,8 @@ struct FeatureChain {
 /// One device of an instance: what it says about itself, before anything is enabled.
 class PhysicalDevice {
   public:
-    /// All devices of Vulkan 1.2 or later with a queue for graphics and compute, the fastest kind first (discrete, integrated,
-    /// virtual, software). Errors: not_found where there is none.
+    /// All devices of Vulkan 1.2 or later with a queue for graphics and compute, the fastest kind first (discrete,
+    /// integrated, virtual, software). Errors: not_found where there is none.
     static Expected<std::vector<std::unique_ptr<PhysicalDevice>>> list(const Instance& instance);
 
     [[nodiscard]] rhi::AdapterInfo describe(std::uint32_t index) const;
@@ -47,9 +48,9 @@ class PhysicalDevice {
     VkPhysicalDeviceMaintenance4Properties maintenance4{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES};
     VkPhysicalDeviceMemoryProperties memory{};
     FeatureChain features;
-    std::uint32_t queue_family = 0;            ///< Graphics and compute.
-    std::uint32_t timestamp_valid_bits = 0;    ///< Of that family; 0: no timestamps.
-    bool has_dynamic_rendering = false;        ///< In core or as extension.
+    std::uint32_t queue_family = 0;          ///< Graphics and compute.
+    std::uint32_t timestamp_valid_bits = 0;  ///< Of that family; 0: no timestamps.
+    bool has_dynamic_rendering = false;      ///< In core or as extension.
     bool has_synchronization2 = false;
     bool has_robustness2 = false;
 

@@ -77,8 +77,12 @@ Expected<void> make_layout(Context& context, std::span<rhi::BackendBindGroupLayo
 }
 
 VkStencilOpState to_vulkan(const rhi::StencilFace& face) {
-    return {vulkan::to_vulkan(face.fail),    vulkan::to_vulkan(face.pass), vulkan::to_vulkan(face.depth_fail),
-            vulkan::to_vulkan(face.compare), face.read_mask,               face.write_mask,
+    return {vulkan::to_vulkan(face.fail),
+            vulkan::to_vulkan(face.pass),
+            vulkan::to_vulkan(face.depth_fail),
+            vulkan::to_vulkan(face.compare),
+            face.read_mask,
+            face.write_mask,
             0};
 }
 
@@ -103,9 +107,9 @@ Expected<std::unique_ptr<rhi::BackendGraphicsPipeline>> GraphicsPipeline::create
 
     std::vector<VkVertexInputBindingDescription> bindings;
     for (std::uint32_t i = 0; i < desc.vertex_buffers.size(); ++i)
-        bindings.push_back({i, desc.vertex_buffers[i].stride,
-                            desc.vertex_buffers[i].per_instance ? VK_VERTEX_INPUT_RATE_INSTANCE
-                                                                : VK_VERTEX_INPUT_RATE_VERTEX});
+        bindings.push_back(
+            {i, desc.vertex_buffers[i].stride,
+             desc.vertex_buffers[i].per_instance ? VK_VERTEX_INPUT_RATE_INSTANCE : VK_VERTEX_INPUT_RATE_VERTEX});
     std::vector<VkVertexInputAttributeDescription> attributes;
     for (const rhi::VertexAttribute& each : desc.vertex_attributes)
         attributes.push_back({each.location, each.buffer, vulkan::to_vulkan(each.format), each.offset});
@@ -127,8 +131,8 @@ Expected<std::unique_ptr<rhi::BackendGraphicsPipeline>> GraphicsPipeline::create
     raster.cullMode = desc.cull == rhi::CullMode::back    ? VK_CULL_MODE_BACK_BIT
                       : desc.cull == rhi::CullMode::front ? VK_CULL_MODE_FRONT_BIT
                                                           : VK_CULL_MODE_NONE;
-    raster.frontFace = desc.front_face == rhi::FrontFace::clockwise ? VK_FRONT_FACE_CLOCKWISE
-                                                                    : VK_FRONT_FACE_COUNTER_CLOCKWISE;
+    raster.frontFace =
+        desc.front_face == rhi::FrontFace::clockwise ? VK_FRONT_FACE_CLOCKWISE : VK_FRONT_FACE_COUNTER_CLOCKWISE;
     raster.depthBiasEnable = depth.depth_bias != 0.0f || depth.depth_bias_slope != 0.0f;
     raster.depthBiasConstantFactor = depth.depth_bias;
     raster.depthBiasSlopeFactor = depth.depth_bias_slope;

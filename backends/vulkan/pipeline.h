@@ -20,8 +20,8 @@ struct PipelineCore {
 
 class GraphicsPipeline final : public rhi::BackendGraphicsPipeline {
   public:
-    static Expected<std::unique_ptr<rhi::BackendGraphicsPipeline>> create(
-        Context& context, const rhi::BackendGraphicsPipelineDesc& desc);
+    static Expected<std::unique_ptr<rhi::BackendGraphicsPipeline>> create(Context& context,
+                                                                          const rhi::BackendGraphicsPipelineDesc& desc);
     ~GraphicsPipeline() override;
 
     PipelineCore core;

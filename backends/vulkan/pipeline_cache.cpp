@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/vulkan/pipeline_cache.h"
 
-#include <cstring>
-
 #include <fmt/format.h>
+
+#include <cstring>
 
 #include "backends/vulkan/result.h"
 #include "core/log.h"
@@ -50,7 +50,7 @@ VkPipelineCache PipelineCache::make(std::span<const std::byte> data) const {
     info.pInitialData = data.data();
     VkPipelineCache cache = VK_NULL_HANDLE;
     return context_.vk.CreatePipelineCache(context_.device, &info, nullptr, &cache) == VK_SUCCESS ? cache
-                                                                                                 : VK_NULL_HANDLE;
+                                                                                                  : VK_NULL_HANDLE;
 }
 
 Expected<void> PipelineCache::save() {

@@ -18,7 +18,8 @@ class PipelineCache {
 
     /// VK_NULL_HANDLE where the driver refused to make one.
     [[nodiscard]] VkPipelineCache handle() const { return handle_; }
-    /// Writes the cache, joined with what other devices have written in the meantime; does nothing where nothing is new.
+    /// Writes the cache, joined with what other devices have written in the meantime; does nothing where nothing is
+    /// new.
     Expected<void> save();
 
     /// Category of the entry in the disk cache.

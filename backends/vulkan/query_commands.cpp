@@ -19,12 +19,13 @@ bool Commands::prepare_query(QueryPool& pool, std::uint32_t index) {
         return true;
     }
     if (context_.report)
-        context_.report({.severity = rhi::MessageSeverity::error,
-                         .source = rhi::MessageSource::driver,
-                         .code = "query-written-twice",
-                         .text = fmt::format("query {} of query pool {} is written twice in one render pass; Vulkan cannot "
-                                             "reset it there. The second one is left out: use another query.",
-                                             index, in_quotes(pool.desc.name))});
+        context_.report(
+            {.severity = rhi::MessageSeverity::error,
+             .source = rhi::MessageSource::driver,
+             .code = "query-written-twice",
+             .text = fmt::format("query {} of query pool {} is written twice in one render pass; Vulkan cannot "
+                                 "reset it there. The second one is left out: use another query.",
+                                 index, in_quotes(pool.desc.name))});
     return false;
 }
 

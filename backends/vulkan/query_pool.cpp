@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/vulkan/query_pool.h"
 
-#include <cmath>
-
 #include <fmt/format.h>
+
+#include <cmath>
 
 #include "backends/vulkan/result.h"
 
@@ -34,9 +34,9 @@ Expected<std::vector<std::uint64_t>> QueryPool::read(std::uint32_t first, std::u
         std::uint64_t value, available;
     };
     std::vector<Raw> raw(count);
-    const VkResult result = context_.check(context_.vk.GetQueryPoolResults(
-        context_.device, handle, first, count, raw.size() * sizeof(Raw), raw.data(), sizeof(Raw),
-        VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WITH_AVAILABILITY_BIT));
+    const VkResult result = context_.check(
+        context_.vk.GetQueryPoolResults(context_.device, handle, first, count, raw.size() * sizeof(Raw), raw.data(),
+                                        sizeof(Raw), VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WITH_AVAILABILITY_BIT));
     if (result != VK_SUCCESS && result != VK_NOT_READY)
         return fail(result, "read queries of", "query pool " + in_quotes(desc.name));
     const std::uint32_t bits = context_.physical->timestamp_valid_bits;
@@ -53,7 +53,8 @@ Expected<std::vector<std::uint64_t>> QueryPool::read(std::uint32_t first, std::u
         values[i] &= mask;
         // Exact for a period of 1; a double would lose nanoseconds after 104 days of running.
         if (period != 1.0)
-            values[i] = static_cast<std::uint64_t>(static_cast<long double>(values[i]) * static_cast<long double>(period));
+            values[i] =
+                static_cast<std::uint64_t>(static_cast<long double>(values[i]) * static_cast<long double>(period));
     }
     return values;
 }

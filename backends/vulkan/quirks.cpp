@@ -8,7 +8,8 @@ namespace {
 
 constexpr QuirkEntry list[] = {
     {VK_DRIVER_ID_MESA_LLVMPIPE, 0, ~0u, Quirk::no_pipeline_cache,
-     "its VkPipelineCache holds nothing (Mesa 22.3 and 25.0 return a bare header): Mesa keeps its own cache of compiled "
+     "its VkPipelineCache holds nothing (Mesa 22.3 and 25.0 return a bare header): Mesa keeps its own cache of "
+     "compiled "
      "code on disk, so ours would be files without content"},
 };
 

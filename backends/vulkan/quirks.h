@@ -13,7 +13,7 @@
 namespace nacre::vulkan {
 
 enum class Quirk : std::uint8_t {
-    no_pipeline_cache,  ///< Do not keep the driver's pipeline cache on disk.
+    no_pipeline_cache,         ///< Do not keep the driver's pipeline cache on disk.
     single_memory_block_kind,  ///< Buffers and images never share a block of memory, whatever the granularity.
 };
 

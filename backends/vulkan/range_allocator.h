@@ -15,8 +15,8 @@
 
 namespace nacre::vulkan {
 
-/// Two-level segregated fit: constant time, at most 1/32 lost to the search of a size class (M. Masmano et al., "TLSF: a
-/// new dynamic memory allocator for real-time systems", 2004). It keeps its own nodes beside the span, since device
+/// Two-level segregated fit: constant time, at most 1/32 lost to the search of a size class (M. Masmano et al., "TLSF:
+/// a new dynamic memory allocator for real-time systems", 2004). It keeps its own nodes beside the span, since device
 /// memory cannot hold them. Not thread-safe.
 class RangeAllocator {
   public:
@@ -50,7 +50,7 @@ class RangeAllocator {
 
     struct Node {
         std::uint64_t offset = 0, size = 0;
-        std::uint32_t before = none, after = none;           ///< Neighbors in the span.
+        std::uint32_t before = none, after = none;  ///< Neighbors in the span.
         std::uint32_t previous_free = none, next_free = none;
         bool is_free = false;
     };

@@ -72,8 +72,7 @@ Expected<VkRenderPass> RenderPassCache::render_pass(const RenderPassKey& key) {
     info.subpassCount = 1;
     info.pSubpasses = &subpass;
     VkRenderPass pass = VK_NULL_HANDLE;
-    if (VkResult result = context_.vk.CreateRenderPass2(context_.device, &info, nullptr, &pass);
-        result != VK_SUCCESS)
+    if (VkResult result = context_.vk.CreateRenderPass2(context_.device, &info, nullptr, &pass); result != VK_SUCCESS)
         return fail(context_.check(result), "create", "render pass");
     render_passes_.emplace(key, pass);
     return pass;

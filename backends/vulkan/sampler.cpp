@@ -9,9 +9,7 @@
 namespace nacre::vulkan {
 namespace {
 
-VkFilter to_vulkan(rhi::Filter filter) {
-    return filter == rhi::Filter::linear ? VK_FILTER_LINEAR : VK_FILTER_NEAREST;
-}
+VkFilter to_vulkan(rhi::Filter filter) { return filter == rhi::Filter::linear ? VK_FILTER_LINEAR : VK_FILTER_NEAREST; }
 
 VkSamplerAddressMode to_vulkan(rhi::AddressMode mode) {
     switch (mode) {
@@ -41,8 +39,7 @@ Expected<std::unique_ptr<rhi::BackendSampler>> Sampler::create(Context& context,
     VkSamplerCreateInfo info{VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO};
     info.magFilter = to_vulkan(desc.magnify);
     info.minFilter = to_vulkan(desc.minify);
-    info.mipmapMode =
-        desc.mip == rhi::Filter::linear ? VK_SAMPLER_MIPMAP_MODE_LINEAR : VK_SAMPLER_MIPMAP_MODE_NEAREST;
+    info.mipmapMode = desc.mip == rhi::Filter::linear ? VK_SAMPLER_MIPMAP_MODE_LINEAR : VK_SAMPLER_MIPMAP_MODE_NEAREST;
     info.addressModeU = to_vulkan(desc.address_u);
     info.addressModeV = to_vulkan(desc.address_v);
     info.addressModeW = to_vulkan(desc.address_w);

@@ -59,20 +59,20 @@ Expected<std::unique_ptr<rhi::BackendTexture>> Texture::create(Context& context,
             context.physical->handle, info.format, info.imageType, info.tiling, info.usage, info.flags, &limits);
         result != VK_SUCCESS)
         return nacre::fail(ErrorCode::unsupported, "create", subject,
-                           fmt::format("this device cannot use format {} in this way ({})",
-                                       rhi::info(desc.format).name, name_of(result)),
+                           fmt::format("this device cannot use format {} in this way ({})", rhi::info(desc.format).name,
+                                       name_of(result)),
                            "Ask Capabilities::format_support first.");
     if (info.extent.width > limits.maxExtent.width || info.extent.height > limits.maxExtent.height ||
         info.extent.depth > limits.maxExtent.depth || info.mipLevels > limits.maxMipLevels ||
         info.arrayLayers > limits.maxArrayLayers || !(limits.sampleCounts & info.samples))
-        return nacre::fail(ErrorCode::unsupported, "create", subject,
-                           fmt::format("{}x{}x{}, {} layers, {} mips, {} samples exceed what this device allows for "
-                                       "format {} and this usage: {}x{}x{}, {} layers, {} mips, sample counts {:#x}",
-                                       info.extent.width, info.extent.height, info.extent.depth, info.arrayLayers,
-                                       info.mipLevels, desc.samples, rhi::info(desc.format).name,
-                                       limits.maxExtent.width, limits.maxExtent.height, limits.maxExtent.depth,
-                                       limits.maxArrayLayers, limits.maxMipLevels, limits.sampleCounts),
-                           "Use a smaller texture or another format.");
+        return nacre::fail(
+            ErrorCode::unsupported, "create", subject,
+            fmt::format("{}x{}x{}, {} layers, {} mips, {} samples exceed what this device allows for "
+                        "format {} and this usage: {}x{}x{}, {} layers, {} mips, sample counts {:#x}",
+                        info.extent.width, info.extent.height, info.extent.depth, info.arrayLayers, info.mipLevels,
+                        desc.samples, rhi::info(desc.format).name, limits.maxExtent.width, limits.maxExtent.height,
+                        limits.maxExtent.depth, limits.maxArrayLayers, limits.maxMipLevels, limits.sampleCounts),
+            "Use a smaller texture or another format.");
     if (VkResult result = context.vk.CreateImage(context.device, &info, nullptr, &texture->handle);
         result != VK_SUCCESS)
         return fail(context.check(result), "create", subject);
@@ -131,8 +131,7 @@ Expected<VkImageView> Texture::view(const rhi::ViewReference& range, ViewPurpose
                         ? VK_IMAGE_VIEW_TYPE_2D
                         : to_vulkan(range.dimension);
     info.format = to_vulkan(range.format);
-    info.subresourceRange.aspectMask =
-        purpose == ViewPurpose::target ? aspects : main_aspect_of(desc.format);
+    info.subresourceRange.aspectMask = purpose == ViewPurpose::target ? aspects : main_aspect_of(desc.format);
     info.subresourceRange.baseMipLevel = range.base_mip;
     info.subresourceRange.levelCount = range.mip_count;
     info.subresourceRange.baseArrayLayer = range.base_layer;
