@@ -15,13 +15,13 @@ enum class MessageSource : std::uint8_t { validation, driver, verify };
 struct Message {
     MessageSeverity severity = MessageSeverity::error;
     MessageSource source = MessageSource::validation;
-    std::string code;  ///< Stable: "N-204 bind-group-layout-mismatch"; a driver's own id for driver messages.
+    std::string code;  ///< Stable: "N-524 bind-group-layout-mismatch"; a driver's own id for driver messages.
     std::string text;  ///< With the objects' names, what was expected, what was found, what to change.
 };
 
 /// An entry in the list of all validation messages.
 struct ValidationRule {
-    std::string_view code;     ///< "N-204 bind-group-layout-mismatch"
+    std::string_view code;     ///< "N-524 bind-group-layout-mismatch"
     std::string_view meaning;  ///< One sentence.
 };
 
