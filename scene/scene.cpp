@@ -54,7 +54,7 @@ bool is_mirrored(const glm::mat4& transform) { return glm::determinant(glm::mat3
 
 Camera framing_camera(const Bounds& scene_bounds, float aspect_ratio) {
     Camera camera{.name = "default"};
-    // Beyond a thousand light years, products of distances would no longer be finite.
+    // Beyond a light year, products of distances would no longer be finite.
     Bounds bounds = scene_bounds;
     bounds.minimum = glm::clamp(bounds.minimum, -1e16f, 1e16f);
     bounds.maximum = glm::clamp(bounds.maximum, -1e16f, 1e16f);
