@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "backends/vulkan/vulkan_backend.h"
 #include "rhi/backend.h"
 
 namespace nacre::command {
@@ -10,6 +11,7 @@ namespace {
 
 std::vector<std::unique_ptr<rhi::Backend>> make_backends() {
     std::vector<std::unique_ptr<rhi::Backend>> backends;
+    backends.push_back(vulkan::make_backend());
     return backends;
 }
 

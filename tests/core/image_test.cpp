@@ -104,6 +104,10 @@ TEST_F(ImageTest, ChannelsAreConverted) {
     EXPECT_EQ(read_image_bytes(*color, "red", {.channels = 1})->bytes, (std::vector<std::uint8_t>{54}));
     const auto wide = encode_png(ImageBytes{1, 1, 1, 2, {0xff, 0xff}});
     EXPECT_EQ(read_image_bytes(*wide, "wide")->bytes, (std::vector<std::uint8_t>{255, 255, 255, 255}));
+    const std::uint16_t bright = 0xff00;  // In the other byte order it would be almost black.
+    ImageBytes machine_order{1, 1, 1, 2, {0, 0}};
+    std::memcpy(machine_order.bytes.data(), &bright, 2);
+    EXPECT_EQ(read_image_bytes(*encode_png(machine_order), "bright", {.channels = 1})->bytes[0], 254);
     EXPECT_FALSE(read_image_bytes(*wide, "wide", {.channels = 5}));
 }
 

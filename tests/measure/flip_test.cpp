@@ -101,6 +101,46 @@ TEST(FlipTest, PointsAreSeenWhereTheyAre) {
     EXPECT_NEAR(result->map.texel(40, 36)[0], result->map.texel(44, 40)[0], 1e-4f);
 }
 
+// Black against a picture that is white right of a vertical border, seen 5 pixels left of it: hardly any light of the
+// border gets there, but the feature detectors reach that far. In one dimension the two parts are sums that can be
+// written down (paper, sections 4.1 to 4.4; sigma in pixels, texel centers 5, 6, ... to the right are white).
+TEST(FlipTest, FeaturesCountAsDerivedByHand) {
+    constexpr double pi = 3.14159265358979, ppd = 67.0;
+    double light = 0, all = 0;
+    for (int x = -10; x <= 10; ++x) {
+        const double weight = std::exp(-pi * pi * x * x / (ppd * ppd) / 0.0047);
+        all += weight;
+        if (x >= 5) light += weight;
+    }
+    light /= all;
+    const double lightness = 116.0 * (light * 841.0 / 108.0 + 4.0 / 29.0) - 16.0;
+    const double color = std::pow(lightness, 0.7) * 0.95 / 16.51;
+
+    const double sigma = 0.5 * 0.082 * ppd;
+    double edge = 0, edge_sum = 0, point = 0, point_sum = 0;
+    for (int x = -9; x <= 9; ++x) {
+        const double gaussian = std::exp(-x * x / (2 * sigma * sigma));
+        const double first = x * gaussian, second = (x * x / (sigma * sigma) - 1) * gaussian;
+        edge_sum += std::max(first, 0.0);
+        point_sum += std::max(second, 0.0);
+        if (x >= 5) edge += first, point += second;
+    }
+    const double feature = std::sqrt(std::max(edge / edge_sum, point / point_sum) / std::sqrt(2.0));
+
+    Image half = uniform(0, 0, 0, 81, 41);
+    for (std::uint32_t y = 0; y < 41; ++y) {
+        for (std::uint32_t x = 40; x < 81; ++x) {
+            for (int c = 0; c < 3; ++c) half.texel(x, y)[c] = 1.0f;
+        }
+    }
+    const auto result = compute_flip(uniform(0, 0, 0, 81, 41), half);
+    ASSERT_TRUE(result);
+    const double expected = std::pow(color, 1.0 - feature);
+    EXPECT_GT(expected, 5.0 * color);  // Most of it is the feature.
+    EXPECT_NEAR(result->map.texel(35, 20)[0], expected, 0.02 * expected);
+    EXPECT_NEAR(result->map.texel(75, 20)[0], 0.9674, 2e-4);  // Far on the white side: black against white.
+}
+
 TEST(FlipTest, OddValuesStayInRange) {
     Image odd = noise(4, 0.5f);
     odd.pixels[100] = std::nanf("");
