@@ -38,6 +38,9 @@ struct Context {
     bool null_descriptors = false;
     bool debug_names = false;
     bool update_after_bind = false;
+    /// Store operation of a depth target that is only read. Storing counts as a write, which would collide with the
+    /// shaders that sample the same texture; drivers without the operation that does nothing have to take it.
+    VkAttachmentStoreOp read_only_store = VK_ATTACHMENT_STORE_OP_STORE;
     std::atomic<bool> is_lost = false;
 
     /// One range for all pipelines and all stages: push constants and bind groups then survive a change of pipeline.

@@ -81,9 +81,9 @@ void Commands::begin_dynamic_rendering(const rhi::BeginRenderPassCommand& comman
         depth.clearValue = stencil.clearValue = clear_value(command.clear_depth, command.clear_stencil);
         // What is only read keeps its content, whatever was said about storing it.
         depth.loadOp = to_vulkan(command.depth_load);
-        depth.storeOp = command.read_only ? VK_ATTACHMENT_STORE_OP_STORE : to_vulkan(command.depth_store);
+        depth.storeOp = command.read_only ? context_.read_only_store : to_vulkan(command.depth_store);
         stencil.loadOp = to_vulkan(command.stencil_load);
-        stencil.storeOp = command.read_only ? VK_ATTACHMENT_STORE_OP_STORE : to_vulkan(command.stencil_store);
+        stencil.storeOp = command.read_only ? context_.read_only_store : to_vulkan(command.stencil_store);
         if (texture.aspects & VK_IMAGE_ASPECT_DEPTH_BIT) info.pDepthAttachment = &depth;
         if (texture.aspects & VK_IMAGE_ASPECT_STENCIL_BIT) info.pStencilAttachment = &stencil;
     }
@@ -114,8 +114,8 @@ void Commands::begin_render_pass(const rhi::BeginRenderPassCommand& command) {
         key.depth_format = to_vulkan(command.depth_stencil.format);
         key.depth_load = to_vulkan(command.depth_load);
         key.stencil_load = to_vulkan(command.stencil_load);
-        key.depth_store = command.read_only ? VK_ATTACHMENT_STORE_OP_STORE : to_vulkan(command.depth_store);
-        key.stencil_store = command.read_only ? VK_ATTACHMENT_STORE_OP_STORE : to_vulkan(command.stencil_store);
+        key.depth_store = command.read_only ? context_.read_only_store : to_vulkan(command.depth_store);
+        key.stencil_store = command.read_only ? context_.read_only_store : to_vulkan(command.stencil_store);
         key.depth_read_only = command.read_only;
         attach(command.depth_stencil, clear_value(command.clear_depth, command.clear_stencil));
     }

@@ -21,7 +21,7 @@ class DeviceTest : public EveryMode {
              .height = height,
              .samples = samples,
              .usage = (info(format).has_depth ? TextureUsage::depth_target : TextureUsage::color_target) |
-                      TextureUsage::copy_source | more,
+                      (samples == 1 ? TextureUsage::copy_source : TextureUsage::none) | more,
              .name = "target"}));
     }
     Shader make_shader(const std::string& path, const std::string& text) {
@@ -158,7 +158,8 @@ TEST_P(DeviceTest, TestsDepthAndSamplesItReadOnly) {
         layout(set = 0, binding = 1) uniform sampler nearest;
         layout(location = 0) out float color;
         void main() { color = texelFetch(sampler2D(depth_texture, nearest), ivec2(gl_FragCoord.xy), 0).r * 2; })");
-    const Sampler sampler = must(gpu().create_sampler({.magnify = Filter::nearest, .minify = Filter::nearest}));
+    const Sampler sampler =
+        must(gpu().create_sampler({.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest}));
     const BindGroup group = must(
         gpu().create_bind_group({.layout = must(gpu().bind_group_layout(reader, 0)),
                                  .entries = {{.binding = 0, .texture = depth}, {.binding = 1, .sampler = sampler}}}));
@@ -384,7 +385,8 @@ TEST_P(DeviceTest, WritesStorageImagesAndSamplesThem) {
         })")}));
     const BindGroup write_group = must(gpu().create_bind_group(
         {.layout = must(gpu().bind_group_layout(writer, 0)), .entries = {{.binding = 0, .texture = image}}}));
-    const Sampler sampler = must(gpu().create_sampler({.magnify = Filter::nearest, .minify = Filter::nearest}));
+    const Sampler sampler =
+        must(gpu().create_sampler({.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest}));
     const BindGroup read_group = must(gpu().create_bind_group(
         {.layout = must(gpu().bind_group_layout(reader, 0)),
          .entries = {{.binding = 0, .texture = image, .sampler = sampler}, {.binding = 1, .buffer = sum}}}));
