@@ -149,7 +149,7 @@ Expected<std::vector<std::uint32_t>> optimize(std::vector<std::uint32_t> words, 
 
 const std::string& glsl_compiler_version() {
     static const std::string version =
-        fmt::format("form 1, glslang {}, {}", glslang_version, spvSoftwareVersionDetailsString());
+        fmt::format("form 2, glslang {}, {}", glslang_version, spvSoftwareVersionDetailsString());
     return version;
 }
 
@@ -171,7 +171,8 @@ Expected<std::vector<std::uint32_t>> compile_glsl(const GlslInput& input) {
     shader.setEnvInput(glslang::EShSourceGlsl, language, glslang::EShClientVulkan, 100);
     shader.setEnvClient(glslang::EShClientVulkan, glslang::EShTargetVulkan_1_1);
     shader.setEnvTarget(glslang::EShTargetSpv, glslang::EShTargetSpv_1_3);
-    shader.setDebugInfo(input.debug_information);
+    // Not TShader::setDebugInfo: it is for NonSemantic.Shader.DebugInfo alone, and without that glslang 12.0 writes
+    // invalid modules for every block in braces. SpvOptions::generateDebugInfo is all that line tables need.
 
     auto messages = static_cast<EShMessages>(EShMsgSpvRules | EShMsgVulkanRules);
     if (input.debug_information) messages = static_cast<EShMessages>(messages | EShMsgDebugInfo);

@@ -26,7 +26,7 @@ std::optional<PageKind> common_kind(const PageKind& a, const PageKind& b, const 
     if (!chains && !(a.mips == 1 && b.mips == 1)) return {};
     PageKind kind = a;
     // Wide enough for 8-bit sRGB in linear light and for 11-bit unorm; 16-bit unorm loses a few bits above 0.25.
-    if (a.format != b.format) kind.format = Format::rgba16_float;
+    if (a.format != b.format || !can_be_drawn(kind.format, capabilities)) kind.format = Format::rgba16_float;
     if (!can_be_drawn(kind.format, capabilities)) return {};
     kind.width = std::max(a.width, b.width);
     kind.height = std::max(a.height, b.height);

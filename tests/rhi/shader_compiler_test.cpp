@@ -159,6 +159,25 @@ TEST(ShaderCompiler, DebugInformationHoldsFilesAndLines) {
     EXPECT_LT(without->spirv.size(), with->spirv.size());
 }
 
+TEST(ShaderCompiler, DebugInformationOfBlocksIsValid) {
+    for (const bool debug_information : {false, true}) {
+        const auto shader = ShaderCompiler({.debug_information = debug_information}).compile({.path = "a.frag", .text = R"(
+            layout(location = 0) out vec4 color;
+            void main() {
+                color = vec4(0);
+                if (gl_FragCoord.x > 4.0) {
+                    vec4 inner = vec4(1);
+                    for (int i = 0; i < 3; ++i) { inner += vec4(i); { vec4 inner_most = inner; inner = inner_most; } }
+                    color = inner;
+                } else {
+                }
+            })"});
+        ASSERT_TRUE(shader);
+        const auto reflection = reflect(shader->spirv, shader->stage);
+        EXPECT_TRUE(reflection) << reflection.error().message();
+    }
+}
+
 TEST(ShaderCompiler, OptimizedModulesAreSmallerAndKeepTheirLayout) {
     const ShaderSource source{.path = "a.comp", .text = R"(
         layout(local_size_x = 8) in;
