@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backends/gl/bind_group.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace nacre::gl {
+
+GlBindGroupLayout::GlBindGroupLayout(const rhi::BindGroupLayoutDesc& layout_desc) {
+    desc = layout_desc;
+    std::ranges::sort(desc.bindings, {}, &rhi::BindingLayout::binding);
+}
+
+std::int32_t GlBindGroupLayout::position(const rhi::BindGroupLayoutDesc& desc, std::uint32_t binding) {
+    std::uint32_t next = 0;
+    for (const rhi::BindingLayout& layout : desc.bindings) {
+        if (layout.binding == binding) return static_cast<std::int32_t>(next);
+        next += layout.count;
+    }
+    return -1;
+}
+
+Expected<std::unique_ptr<rhi::BackendBindGroup>> GlBindGroup::create(rhi::BackendBindGroupLayout& layout,
+                                                                     std::span<const rhi::BackendBinding> bindings,
+                                                                     const std::string& name) {
+    auto group = std::make_unique<GlBindGroup>();
+    group->layout = &layout;
+    std::uint32_t total = 0;
+    for (const rhi::BindingLayout& binding : layout.desc.bindings) total += binding.count;
+    group->entries.resize(total);
+    for (const rhi::BackendBinding& binding : bindings) {
+        const std::int32_t position = GlBindGroupLayout::position(layout.desc, binding.binding);
+        const std::size_t at = static_cast<std::size_t>(position) + binding.element;
+        if (position < 0 || at >= group->entries.size()) continue;
+        Entry& entry = group->entries[at];
+        entry.buffer = static_cast<GlBuffer*>(binding.buffer);
+        entry.offset = binding.offset;
+        entry.size = binding.size;
+        entry.sampler = static_cast<GlSampler*>(binding.sampler);
+        const bool has_texture = binding.type == rhi::BindingType::sampled_texture ||
+                                 binding.type == rhi::BindingType::combined_texture_sampler ||
+                                 binding.type == rhi::BindingType::storage_image ||
+                                 binding.type == rhi::BindingType::readonly_storage_image ||
+                                 binding.type == rhi::BindingType::writeonly_storage_image;
+        if (!has_texture) continue;
+        entry.texture = static_cast<GlTexture*>(binding.view.texture.object);
+        entry.view = binding.view;
+        const bool sampled = binding.type == rhi::BindingType::sampled_texture ||
+                             binding.type == rhi::BindingType::combined_texture_sampler;
+        if (sampled && entry.texture && !entry.texture->can_view(binding.view))
+            return fail(ErrorCode::unsupported, "create bind group",
+                        fmt::format("'{}', binding {}, texture '{}'", name, binding.binding, entry.texture->desc.name),
+                        "this OpenGL ES has no texture views: only all layers, in the texture's own dimension and format, "
+                        "can be sampled",
+                        "Bind the whole texture and choose the layer in the shader.");
+    }
+    return group;
+}
+
+}  // namespace nacre::gl
