@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "backends/gl/gl_backend.h"
 #include "backends/vulkan/vulkan_backend.h"
 #include "rhi/backend.h"
 
@@ -12,6 +13,8 @@ namespace {
 std::vector<std::unique_ptr<rhi::Backend>> make_backends() {
     std::vector<std::unique_ptr<rhi::Backend>> backends;
     backends.push_back(vulkan::make_backend());
+    backends.push_back(gl::make_backend());
+    backends.push_back(gl::make_es_backend());
     return backends;
 }
 
