@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "passes/render_pass.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <map>
+#include <set>
+#include <tuple>
+
+namespace nacre::passes {
+
+using rhi::ResourceUse;
+
+namespace {
+
+rhi::Topology topology_of(scene::Topology topology) {
+    switch (topology) {
+        case scene::Topology::point_list: return rhi::Topology::point_list;
+        case scene::Topology::line_list: return rhi::Topology::line_list;
+        case scene::Topology::triangle_list: break;
+    }
+    return rhi::Topology::triangle_list;
+}
+
+}  // namespace
+
+Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPassDesc& desc,
+                                      std::vector<std::uint32_t> draws, bool keep_order) {
+    device_ = &context.device;
+    geometry_ = &context.geometry;
+    materials_ = &context.materials;
+    uses_materials_ = !desc.fragment_shader.empty();
+
+    // What a pipeline depends on. Materials whose sets of textures differ have different layouts.
+    struct Key {
+        ShadingFeatures features;
+        scene::Topology topology;
+        rhi::CullMode cull;
+        bool mirrored;
+        std::uint32_t texture_mask;
+        auto operator<=>(const Key&) const = default;
+    };
+    std::map<Key, std::uint32_t> known;
+    const auto pipeline_for = [&](const Key& key, const Draw& draw) -> Expected<std::uint32_t> {
+        if (const auto found = known.find(key); found != known.end()) return found->second;
+        rhi::GraphicsPipelineDesc pipeline;
+        std::vector<rhi::ShaderDefine> defines = vertex_defines(key.features);
+        defines.insert(defines.end(), desc.defines.begin(), desc.defines.end());
+        NACRE_TRY(pipeline.vertex, context.shaders.get(desc.name, {.path = desc.vertex_shader, .defines = defines}));
+        pipeline.bind_group_layouts = {desc.frame_layout};
+        if (uses_materials_) {
+            defines = fragment_defines(key.features);
+            defines.insert(defines.end(), desc.defines.begin(), desc.defines.end());
+            NACRE_TRY(pipeline.fragment,
+                      context.shaders.get(desc.name, {.path = desc.fragment_shader, .defines = defines}));
+            pipeline.bind_group_layouts.push_back(context.materials.layout(draw.material));
+        }
+        SceneGeometry::describe_vertices(key.features.attributes, pipeline);
+        pipeline.topology = topology_of(key.topology);
+        pipeline.cull = key.cull;
+        pipeline.front_face = key.mirrored ? rhi::FrontFace::clockwise : rhi::FrontFace::counter_clockwise;
+        pipeline.depth_stencil = desc.depth_stencil;
+        pipeline.color_targets = desc.color_targets;
+        pipeline.name = desc.name;
+        NACRE_TRY(const rhi::GraphicsPipeline handle, context.device.create_graphics_pipeline(pipeline));
+        pipelines_.push_back(handle);
+        return known.emplace(key, static_cast<std::uint32_t>(pipelines_.size() - 1)).first->second;
+    };
+
+    for (const std::uint32_t index : draws) {
+        const Draw& draw = geometry_->draws()[index];
+        ShadingFeatures features = restricted(draw.features, desc.textures, desc.with_normals, desc.with_colors);
+        if (!desc.keeps_unlit) features.unlit = false;
+        const bool culls = desc.culls && !draw.two_faces;
+        Key key{features, draw.topology, culls ? rhi::CullMode::back : rhi::CullMode::none,
+                (culls || features.double_sided) && draw.mirrored,
+                uses_materials_ ? context.materials.texture_mask(draw.material) : 0};
+        Item item{.draw = index, .attributes = features.attributes};
+        const bool sorted_faces = keep_order && draw.two_faces && draw.topology == scene::Topology::triangle_list;
+        if (sorted_faces) {
+            // Far faces of a closed transparent body first, then the near ones.
+            key.mirrored = draw.mirrored;
+            key.cull = rhi::CullMode::front;
+            NACRE_TRY(item.back_pipeline, pipeline_for(key, draw));
+            key.cull = rhi::CullMode::back;
+        }
+        NACRE_TRY(item.pipeline, pipeline_for(key, draw));
+        items_.push_back(item);
+    }
+    if (!keep_order) {
+        std::ranges::stable_sort(items_, {}, [&](const Item& item) {
+            return std::tuple(item.pipeline, geometry_->draws()[item.draw].material);
+        });
+    }
+    return {};
+}
+
+void GeometryDraws::record_item(rhi::CommandList& list, const Item& item, rhi::BindGroup frame_group,
+                                std::uint32_t pipeline, std::uint32_t& bound_pipeline,
+                                std::uint32_t& bound_material) const {
+    const Draw& draw = geometry_->draws()[item.draw];
+    if (pipeline != bound_pipeline) {
+        list.set_pipeline(pipelines_[pipeline]);
+        list.set_bind_group(0, frame_group);
+        bound_pipeline = pipeline;
+        bound_material = ~0u;
+    }
+    if (uses_materials_ && draw.material != bound_material) {
+        list.set_bind_group(1, materials_->group(draw.material));
+        bound_material = draw.material;
+    }
+    geometry_->record(list, draw, item.attributes);
+}
+
+void GeometryDraws::record(rhi::CommandList& list, rhi::BindGroup frame_group) const {
+    std::uint32_t pipeline = ~0u, material = ~0u;
+    for (const Item& item : items_) record_item(list, item, frame_group, item.pipeline, pipeline, material);
+}
+
+void GeometryDraws::record_one(rhi::CommandList& list, rhi::BindGroup frame_group, std::uint32_t draw,
+                               bool back_faces) const {
+    const auto item = std::ranges::find(items_, draw, &Item::draw);
+    if (item == items_.end()) return;
+    std::uint32_t pipeline = ~0u, material = ~0u;
+    if (back_faces) {
+        if (item->back_pipeline != ~0u) record_item(list, *item, frame_group, item->back_pipeline, pipeline, material);
+    } else {
+        record_item(list, *item, frame_group, item->pipeline, pipeline, material);
+    }
+}
+
+GeometryDraws::~GeometryDraws() {
+    for (const rhi::GraphicsPipeline pipeline : pipelines_) device_->destroy(pipeline);
+}
+
+void uses_geometry(PassDeclaration& pass, const RenderContext& context, const GeometryPassDesc& desc,
+                   std::span<const std::uint32_t> draws) {
+    const FrameResources& resources = context.resources;
+    std::uint32_t attributes = 0;
+    std::set<std::uint32_t> textures;
+    for (const std::uint32_t index : draws) {
+        const Draw& draw = context.geometry.draws()[index];
+        attributes |= restricted(draw.features, desc.textures, desc.with_normals, desc.with_colors).attributes;
+        if (desc.fragment_shader.empty()) continue;
+        const auto& of_material = context.materials.textures_of(draw.material);
+        textures.insert(of_material.begin(), of_material.end());
+    }
+    for (std::size_t i = 0; i < resources.geometry.size(); ++i) {
+        const SceneGeometry::NamedBuffer& buffer = context.geometry.buffers()[i];
+        const bool read = buffer.attribute == ~0u || (attributes & (1u << buffer.attribute)) != 0;
+        if (read) pass.uses(resources.geometry[i], buffer.use);
+    }
+    if (desc.fragment_shader.empty()) return;
+    pass.uses(resources.materials, ResourceUse::uniform_buffer);
+    for (const std::uint32_t texture : textures) pass.uses(resources.material_textures[texture], ResourceUse::sampled);
+}
+
+void uses_lighting(PassDeclaration& pass, const FrameResources& resources) {
+    pass.uses(resources.camera, ResourceUse::uniform_buffer)
+        .uses(resources.lights, ResourceUse::uniform_buffer)
+        .uses(resources.irradiance, ResourceUse::uniform_buffer)
+        .uses(resources.albedo_table, ResourceUse::sampled)
+        .uses(resources.environment, ResourceUse::sampled)
+        .uses(resources.shadow_maps, ResourceUse::sampled);
+}
+
+std::vector<rhi::ShaderDefine> lighting_defines(const Decisions& decisions) {
+    std::vector<rhi::ShaderDefine> defines = {{"ENVIRONMENT_MIPS", std::to_string(decisions.environment_mips)}};
+    if (decisions.light_capacity > 0) defines.push_back({"LIGHTS", std::to_string(decisions.light_capacity)});
+    if (decisions.shadow_capacity > 0) {
+        defines.push_back({"SHADOW_VIEWS", std::to_string(decisions.shadow_capacity)});
+        defines.push_back({"SHADOW_FILTER_WIDTH", std::to_string(decisions.shadow_filter_width)});
+    }
+    return defines;
+}
+
+rhi::ShaderDefine lit_format_define(const Decisions& decisions) {
+    return {"LIT_FORMAT", decisions.lit_format == rhi::Format::rgba32_float ? "rgba32f" : "rgba16f"};
+}
+
+Expected<void> ComputeStep::prepare(RenderContext& context, const std::string& pass, const rhi::ShaderSource& source,
+                                    std::uint32_t set, std::vector<rhi::BindGroupEntry> entries,
+                                    std::vector<rhi::BindGroupLayout> layouts) {
+    NACRE_TRY(const rhi::Shader shader, context.shaders.get(pass, source));
+    NACRE_TRY(pipeline, context.device.create_compute_pipeline(
+                            {.shader = shader, .bind_group_layouts = std::move(layouts), .name = source.path}));
+    NACRE_TRY(const rhi::BindGroupLayout layout, context.device.bind_group_layout(pipeline, set));
+    group_index = set;
+    NACRE_TRY(group, context.device.create_bind_group({.layout = layout, .entries = std::move(entries), .name = pass}));
+    return {};
+}
+
+void ComputeStep::bind(rhi::CommandList& list) const {
+    list.set_pipeline(pipeline);
+    list.set_bind_group(group_index, group);
+}
+
+void ComputeStep::destroy(rhi::Device& device) {
+    if (group) device.destroy(group);
+    if (pipeline) device.destroy(pipeline);
+}
+
+}  // namespace nacre::passes

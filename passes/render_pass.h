@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "passes/frame_graph.h"
+#include "passes/profiles.h"
+#include "passes/scene_geometry.h"
+#include "passes/scene_materials.h"
+#include "passes/shader_library.h"
+
+/// @file
+/// What all passes share: how the picture is divided into passes for this scene and device (`Decisions`), the textures
+/// that they hand on, and the two kinds of pass, drawing and computing.
+///
+///     class Sky : public RenderPass {
+///         Sky(RenderContext& context) { context.graph.add_pass("sky").uses(...).records([this](auto& pass) { ... }); }
+///         Expected<void> prepare(RenderContext& context) override { ... makes pipeline and bind group ... }
+///     };
+
+namespace nacre::passes {
+
+/// What the scene, the profile and the device come to. Everything that is false here costs nothing.
+struct Decisions {
+    bool draws_opaque = false, alpha_test = false, blend = false, unlit = false, slab = false;
+    bool emission = false;               ///< Some deferred surface emits light.
+    bool packed_targets = false;         ///< Emission and blending go through integer targets.
+    bool automatic_exposure = false;
+    bool filmic = true;
+    std::uint32_t light_capacity = 0;    ///< Entries of the light list; 0: no lights.
+    std::uint32_t shadow_capacity = 0;   ///< Entries of the list of shadow views; 0: no shadows.
+    std::uint32_t shadow_view_count = 0; ///< Layers of the shadow map.
+    std::uint32_t shadow_map_size = 0;
+    std::uint32_t shadow_filter_width = 1;
+    std::uint32_t environment_size = 0, environment_mips = 1;
+    rhi::Format lit_format = rhi::Format::rgba16_float;
+    rhi::Format depth_format = rhi::Format::d32_float;
+};
+
+/// Textures and buffers by the role that they have; ids are empty where a role is not filled.
+struct FrameResources {
+    TextureId depth, material_0, material_1, top_layer, emission, shadow_maps, lit, tile_classes, final_color;
+    BufferId tile_lists, tiles, tile_lists_start, exposure, camera, lights, shadow_cameras, materials, irradiance;
+    TextureId environment, albedo_table;
+    std::vector<BufferId> geometry;              ///< As SceneGeometry::buffers().
+    std::vector<TextureId> material_textures;    ///< As SceneMaterials::textures().
+};
+
+struct RenderContext {
+    rhi::Device& device;
+    FrameGraph& graph;
+    ShaderLibrary& shaders;
+    const SceneGeometry& geometry;
+    const SceneMaterials& materials;
+    const Profile& profile;
+    const Decisions& decisions;
+    FrameResources& resources;
+    std::uint32_t width = 0, height = 0;
+    rhi::BindGroupLayout camera_layout{};    ///< Set 0 with the camera alone.
+    rhi::BindGroupLayout lighting_layout{};  ///< Set 0 with camera, lights and environment.
+    rhi::BindGroup camera_group{};
+    rhi::BindGroup lighting_group{};
+    rhi::Sampler nearest{};                  ///< For texelFetch, where a sampler must be bound.
+    rhi::Sampler linear{};                   ///< Clamps to the edge, with mips.
+    bool write_tile_classes = false;
+};
+
+class RenderPass {
+  public:
+    virtual ~RenderPass() = default;
+    /// Makes pipelines and bind groups; called once, after the graph has its textures and if one of the passes that it
+    /// declared is live.
+    virtual Expected<void> prepare(RenderContext& context) = 0;
+    /// Called before each frame is recorded.
+    virtual void update(const glm::vec3& viewer) { (void)viewer; }
+    /// Draws in a frame, for the plan.
+    [[nodiscard]] virtual std::uint64_t draw_count() const { return 0; }
+    std::string name;
+};
+
+/// How a pass draws geometry.
+struct GeometryPassDesc {
+    std::string name;
+    std::string vertex_shader;
+    std::string fragment_shader;            ///< Empty: depth only, without materials.
+    std::vector<rhi::ShaderDefine> defines; ///< For both shaders.
+    std::uint32_t textures = 0;             ///< Which textures the fragment shader reads (texture_bit).
+    bool with_normals = false, with_colors = false;
+    bool keeps_unlit = false;               ///< The fragment shader distinguishes UNLIT.
+    rhi::DepthStencilState depth_stencil;
+    std::vector<rhi::ColorTargetState> color_targets;
+    rhi::BindGroupLayout frame_layout;      ///< Of set 0.
+    bool culls = true;                      ///< Back faces of one-sided materials are not drawn.
+};
+
+/// The draws of one pass with their pipelines, in an order with few changes.
+class GeometryDraws {
+  public:
+    GeometryDraws() = default;
+    GeometryDraws(const GeometryDraws&) = delete;
+    GeometryDraws& operator=(const GeometryDraws&) = delete;
+    ~GeometryDraws();
+
+    /// `draws`: indices into the geometry's draws; their order is kept when `keep_order`.
+    Expected<void> prepare(RenderContext& context, const GeometryPassDesc& desc, std::vector<std::uint32_t> draws,
+                           bool keep_order = false);
+    /// Records all draws, or those at the given positions. The group for set 0 is bound for each pipeline.
+    void record(rhi::CommandList& list, rhi::BindGroup frame_group) const;
+    void record_one(rhi::CommandList& list, rhi::BindGroup frame_group, std::uint32_t draw, bool back_faces) const;
+    [[nodiscard]] std::uint64_t size() const { return items_.size(); }
+
+  private:
+    struct Item {
+        std::uint32_t draw = 0;
+        std::uint32_t pipeline = 0;
+        std::uint32_t back_pipeline = ~0u;
+        std::uint32_t attributes = 0;
+    };
+    void record_item(rhi::CommandList& list, const Item& item, rhi::BindGroup frame_group, std::uint32_t pipeline,
+                     std::uint32_t& bound_pipeline, std::uint32_t& bound_material) const;
+
+    rhi::Device* device_ = nullptr;
+    const SceneGeometry* geometry_ = nullptr;
+    const SceneMaterials* materials_ = nullptr;
+    bool uses_materials_ = false;
+    std::vector<rhi::GraphicsPipeline> pipelines_;
+    std::vector<Item> items_;
+};
+
+/// Indices of the draws for which `predicate` holds.
+template <typename Predicate>
+std::vector<std::uint32_t> select_draws(const SceneGeometry& geometry, Predicate&& predicate) {
+    std::vector<std::uint32_t> result;
+    for (std::uint32_t i = 0; i < geometry.draws().size(); ++i) {
+        if (predicate(geometry.draws()[i])) result.push_back(i);
+    }
+    return result;
+}
+
+/// States what drawing these draws in a pass of this description reads.
+void uses_geometry(PassDeclaration& pass, const RenderContext& context, const GeometryPassDesc& desc,
+                   std::span<const std::uint32_t> draws);
+/// States that a pass reads lights, shadows and environment.
+void uses_lighting(PassDeclaration& pass, const FrameResources& resources);
+/// Defines of passes/shared/lighting.glsl.
+std::vector<rhi::ShaderDefine> lighting_defines(const Decisions& decisions);
+/// LIT_FORMAT.
+rhi::ShaderDefine lit_format_define(const Decisions& decisions);
+
+/// A compute shader with its own bind group.
+struct ComputeStep {
+    rhi::ComputePipeline pipeline{};
+    rhi::BindGroup group{};
+    std::uint32_t group_index = 0;
+    /// Set 0 is `context.lighting_group` where `lit`.
+    Expected<void> prepare(RenderContext& context, const std::string& pass, const rhi::ShaderSource& source,
+                           std::uint32_t set, std::vector<rhi::BindGroupEntry> entries,
+                           std::vector<rhi::BindGroupLayout> layouts = {});
+    void bind(rhi::CommandList& list) const;
+    void destroy(rhi::Device& device);
+};
+
+// One function for each pass folder, in the order of the frame. Each declares its passes in the graph.
+std::unique_ptr<RenderPass> make_shadow_maps(RenderContext& context, std::span<const rhi::BindGroup> view_groups);
+std::unique_ptr<RenderPass> make_depth_prepass(RenderContext& context);
+std::unique_ptr<RenderPass> make_alpha_test_prepass(RenderContext& context);
+std::unique_ptr<RenderPass> make_stencil_prepass(RenderContext& context);
+std::unique_ptr<RenderPass> make_base_pass(RenderContext& context);
+std::unique_ptr<RenderPass> make_tile_classification(RenderContext& context);
+std::unique_ptr<RenderPass> make_lighting(RenderContext& context);
+std::unique_ptr<RenderPass> make_sky(RenderContext& context);
+std::unique_ptr<RenderPass> make_emission(RenderContext& context);
+std::unique_ptr<RenderPass> make_blend(RenderContext& context);
+std::unique_ptr<RenderPass> make_exposure(RenderContext& context);
+std::unique_ptr<RenderPass> make_tonemap(RenderContext& context);
+
+}  // namespace nacre::passes
