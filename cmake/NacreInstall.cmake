@@ -4,7 +4,6 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# A target `Name::target` that a part was linked with comes from the package of that name, `Name` or `Name-static` too.
 get_property(NACRE_PACKAGES GLOBAL PROPERTY NACRE_PACKAGES)
 list(REMOVE_DUPLICATES NACRE_PACKAGES)
 list(SORT NACRE_PACKAGES)
@@ -17,9 +16,15 @@ install(FILES "${CMAKE_BINARY_DIR}/nacreConfig.cmake" "${CMAKE_BINARY_DIR}/nacre
   DESTINATION "${package_dir}")
 install(EXPORT nacre-targets NAMESPACE nacre:: DESTINATION "${package_dir}")
 
+# Headers that are no part of the interface: what a folder below a part holds, and these.
+set(internal_headers
+  core/image_formats.h rhi/device_access.h rhi/device_state.h rhi/embedded_shaders.h rhi/glslang_version.h
+  rhi/object_checks.h rhi/objects.h rhi/pipeline_checks.h rhi/shader_compiler_glslang.h rhi/slot_table.h rhi/spirv.h
+  rhi/state_tracker.h rhi/texture_pages.h rhi/validation_rules.h)
 foreach(part core rhi materials scene passes measure)
-  install(DIRECTORY "${CMAKE_SOURCE_DIR}/${part}" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/nacre"
-    FILES_MATCHING PATTERN "*.h")
+  file(GLOB headers RELATIVE "${CMAKE_SOURCE_DIR}" CONFIGURE_DEPENDS "${part}/*.h")
+  list(REMOVE_ITEM headers ${internal_headers})
+  install(FILES ${headers} DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/nacre/${part}")
 endforeach()
 # Of a backend a program needs only the header that declares it.
 foreach(backend vulkan gl)

@@ -14,6 +14,11 @@ run("${CMAKE_COMMAND}" --install "${BUILD}" --prefix "${WORK}/prefix")
 
 # Headers of Nacre must come from the prefix: the consumer is copied away from the source tree.
 file(COPY "${CONSUMER}/" DESTINATION "${WORK}/consumer")
+# Every installed header finds what it includes among the installed ones.
+file(GLOB_RECURSE headers RELATIVE "${WORK}/prefix/include/nacre" "${WORK}/prefix/include/nacre/*.h")
+list(TRANSFORM headers REPLACE "(.+)" "#include \"\\1\"\n")
+list(JOIN headers "" includes)
+file(WRITE "${WORK}/consumer/all_headers.cpp" "${includes}")
 run("${CMAKE_COMMAND}" -S "${WORK}/consumer" -B "${WORK}/consumer-build" -G Ninja -DCMAKE_BUILD_TYPE=Release
   "-DCMAKE_CXX_COMPILER=${COMPILER}" "-DCMAKE_CXX_FLAGS=${FLAGS}" "-DCMAKE_PREFIX_PATH=${WORK}/prefix")
 run("${CMAKE_COMMAND}" --build "${WORK}/consumer-build")

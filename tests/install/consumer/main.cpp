@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "rhi/shader_compiler.h"
-#include "scene/load.h"
+#include "backends/gl/gl_backend.h"
+#include "backends/vulkan/vulkan_backend.h"
+#include "rhi/device.h"
 
 #include <iostream>
 
 int main() {
-    const auto scene = nacre::scene::load_scene("builtin:spheres");
-    nacre::rhi::ShaderCompiler compiler({});
-    const auto shader = compiler.compile({.path = "empty.comp", .text = "layout(local_size_x = 1) in;\nvoid main() {}\n"});
-    std::cout << (!scene ? scene.error().message() : !shader ? shader.error().message() : "nacre works") << '\n';
+    std::vector<std::unique_ptr<nacre::rhi::Backend>> backends;
+    backends.push_back(nacre::vulkan::make_backend());
+    backends.push_back(nacre::gl::make_backend());
+    const nacre::rhi::Instance instance(std::move(backends));
+    for (const auto& adapter : instance.adapters()) std::cout << adapter.backend << ": " << adapter.name << '\n';
+    for (const auto& missing : instance.unavailable()) std::cout << missing.backend << ": " << missing.error.message() << '\n';
+    std::cout << "nacre works\n";
 }
