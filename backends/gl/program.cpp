@@ -185,6 +185,15 @@ Expected<void> build(const Driver& driver, GLuint program, std::span<rhi::Backen
         // Lives on as long as the program has it.
         gl.DeleteShader(shader);
     }
+    if (driver.traits.es && stages.size() == 1 && stages[0]->reflection.stage == rhi::ShaderStage::vertex) {
+        // OpenGL ES links no program without a fragment shader; depth-only pipelines have none.
+        const GLuint shader = gl.CreateShader(GL_FRAGMENT_SHADER);
+        const char* nothing = "#version 310 es\nvoid main() {}\n";
+        gl.ShaderSource(shader, 1, &nothing, nullptr);
+        gl.CompileShader(shader);
+        gl.AttachShader(program, shader);
+        gl.DeleteShader(shader);
+    }
     if (driver.traits.program_binary) gl.ProgramParameteri(program, GL_PROGRAM_BINARY_RETRIEVABLE_HINT, GL_TRUE);
     gl.LinkProgram(program);
     GLint linked = 0;
