@@ -188,8 +188,10 @@ Expected<void> build(const Driver& driver, GLuint program, std::span<rhi::Backen
     if (driver.traits.es && stages.size() == 1 && stages[0]->reflection.stage == rhi::ShaderStage::vertex) {
         // OpenGL ES links no program without a fragment shader; depth-only pipelines have none.
         const GLuint shader = gl.CreateShader(GL_FRAGMENT_SHADER);
-        const char* nothing = "#version 310 es\nvoid main() {}\n";
-        gl.ShaderSource(shader, 1, &nothing, nullptr);
+        const std::string& vertex = translations[0].source;
+        const std::string nothing = vertex.substr(0, vertex.find('\n')) + "\nvoid main() {}\n";  // the same #version
+        const char* source = nothing.c_str();
+        gl.ShaderSource(shader, 1, &source, nullptr);
         gl.CompileShader(shader);
         gl.AttachShader(program, shader);
         gl.DeleteShader(shader);
