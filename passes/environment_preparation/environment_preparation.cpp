@@ -164,7 +164,7 @@ Expected<std::unique_ptr<PreparedEnvironment>> PreparedEnvironment::create(rhi::
                          {.binding = 1, .texture = faces(source, 0)},
                          {.binding = 2, .buffer = temporary.parameters, .size = 16}}));
     graph.add_pass(to_cube)
-        .uses(picture_id, ResourceUse::sampled | ResourceUse::copy_source | ResourceUse::copy_destination)
+        .uses(picture_id, ResourceUse::sampled | ResourceUse::copy_destination)
         .uses(parameters_id, ResourceUse::uniform_buffer)
         .uses(source_id, ResourceUse::storage_write | ResourceUse::copy_source | ResourceUse::copy_destination)
         .uses(cube_id, ResourceUse::copy_destination)
@@ -213,7 +213,7 @@ Expected<std::unique_ptr<PreparedEnvironment>> PreparedEnvironment::create(rhi::
                          {.binding = 1, .buffer = result->irradiance_}}));
     graph.add_pass(project)
         .uses(source_id, ResourceUse::sampled)
-        .uses(irradiance_id, ResourceUse::storage_write)
+        .uses(irradiance_id, ResourceUse::storage_read | ResourceUse::storage_write)
         .records([&](PassContext& pass) {
             pass.list.set_pipeline(irradiance.pipeline);
             pass.list.set_bind_group(0, irradiance.group);

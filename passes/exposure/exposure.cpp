@@ -19,7 +19,7 @@ class Exposure final : public RenderPass {
         PassDeclaration pass = context.graph.add_pass(name);
         pass.uses(resources_.lit, ResourceUse::sampled)
             .uses(histogram_, ResourceUse::copy_destination | ResourceUse::storage_read | ResourceUse::storage_write)
-            .uses(resources_.exposure, ResourceUse::storage_write);
+            .uses(resources_.exposure, ResourceUse::storage_read | ResourceUse::storage_write);
         pass.records([this](PassContext& frame) {
             frame.list.fill_buffer(frame.buffer(histogram_), 0);
             count_.bind(frame.list);

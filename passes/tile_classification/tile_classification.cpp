@@ -22,7 +22,7 @@ class TileClassification final : public RenderPass {
         pass.uses(resources_.material_0, ResourceUse::sampled)
             .uses(resources_.tile_lists_start, ResourceUse::copy_source)
             .uses(resources_.tile_lists, ResourceUse::copy_destination | ResourceUse::storage_read | ResourceUse::storage_write)
-            .uses(resources_.tiles, ResourceUse::storage_write);
+            .uses(resources_.tiles, ResourceUse::storage_read | ResourceUse::storage_write);
         if (write_classes_) pass.uses(resources_.tile_classes, ResourceUse::storage_write);
         pass.records([this](PassContext& frame) {
             frame.list.copy_buffer(frame.buffer(resources_.tile_lists_start), 0, frame.buffer(resources_.tile_lists), 0, 64);
