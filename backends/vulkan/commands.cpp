@@ -29,6 +29,7 @@ Expected<void> Commands::record(const rhi::ExecutionPlan& plan) {
         return fail(context_.check(result), "reset", "command pool");
     used_buffers_ = 0;
     order_.clear();
+    open_groups_.clear();
     status_ = {};
     NACRE_CHECK(begin_part());
     const rhi::BarrierBatch* batch = plan.batches.data();
@@ -81,6 +82,7 @@ Expected<void> Commands::begin_part() {
     part_has_queries_ = false;
     resets_.clear();
     NACRE_TRY(commands_, next_buffer());
+    for (const char* name : open_groups_) begin_label(name);
     return {};
 }
 
@@ -90,6 +92,7 @@ Expected<void> Commands::end_part() {
         NACRE_CHECK(record_resets(before));
         order_.push_back(before);
     }
+    for (std::size_t i = 0; i < open_groups_.size(); ++i) end_label();
     if (VkResult result = vk_.EndCommandBuffer(commands_); result != VK_SUCCESS)
         return fail(context_.check(result), "end", "command buffer");
     order_.push_back(commands_);
@@ -261,8 +264,8 @@ void Commands::visit(const rhi::CommandHeader& header, const std::byte* payload,
         case write_timestamp: this->write_timestamp(NACRE_AS(WriteTimestampCommand)); break;
         case begin_occlusion_query: begin_occlusion(NACRE_AS(BeginOcclusionQueryCommand)); break;
         case end_occlusion_query: end_occlusion(NACRE_AS(EndOcclusionQueryCommand)); break;
-        case push_debug_group: begin_label(stream.strings[NACRE_AS(PushDebugGroupCommand).name].c_str()); break;
-        case pop_debug_group: end_label(); break;
+        case push_debug_group: push_group(stream.strings[NACRE_AS(PushDebugGroupCommand).name].c_str()); break;
+        case pop_debug_group: pop_group(); break;
         case begin_statement:
         case end_statement: break;
     }
@@ -274,6 +277,18 @@ void Commands::begin_label(const char* name) const {
     VkDebugUtilsLabelEXT label{VK_STRUCTURE_TYPE_DEBUG_UTILS_LABEL_EXT};
     label.pLabelName = name;
     vk_.CmdBeginDebugUtilsLabelEXT(commands_, &label);
+}
+
+void Commands::push_group(const char* name) {
+    open_groups_.push_back(name);
+    begin_label(name);
+}
+
+void Commands::pop_group() {
+    // lavapipe crashes where more labels end than began.
+    if (open_groups_.empty()) return;
+    open_groups_.pop_back();
+    end_label();
 }
 
 void Commands::end_label() const {

@@ -76,6 +76,8 @@ class Commands {
 
     void begin_label(const char* name) const;
     void end_label() const;
+    void push_group(const char* name);
+    void pop_group();
 
     Context& context_;
     const DeviceFunctions& vk_;
@@ -91,6 +93,9 @@ class Commands {
     bool part_has_queries_ = false;
     std::vector<std::pair<QueryPool*, std::uint32_t>> resets_;
     bool occlusion_is_open_ = false;
+
+    /// Debug groups that are open: a label may not reach from one command buffer into the next, so each part opens its own.
+    std::vector<const char*> open_groups_;
 
     bool in_pass_ = false, pass_has_label_ = false;
     const PipelineCore* pipeline_ = nullptr;
