@@ -255,6 +255,27 @@ TEST_P(DeviceTest, CountsSamplesAndTime) {
     }
 }
 
+// A pass that follows a query is recorded into a command buffer of its own; the group around both must not break.
+TEST_P(DeviceTest, DebugGroupsReachOverPassesAndQueries) {
+    const Texture target = make_target(Format::rgba8_unorm, 4, 4);
+    const QueryPool times = must(gpu().create_query_pool({.type = QueryType::timestamp, .count = 6, .name = "times"}));
+    for (int repetition = 0; repetition < 3; ++repetition) {
+        CommandList list = gpu().create_command_list("groups");
+        list.push_debug_group("frame");
+        for (std::uint32_t pass = 0; pass < 3; ++pass) {
+            list.push_debug_group("pass");
+            list.write_timestamp(times, 2 * pass);
+            list.begin_render_pass({.color = {{.view = target, .load = LoadOperation::clear}}});
+            list.end_render_pass();
+            list.write_timestamp(times, 2 * pass + 1);
+            list.pop_debug_group();
+        }
+        list.pop_debug_group();
+        must(gpu().submit(std::move(list)));
+        EXPECT_EQ(must(gpu().read_queries(times, 0, 6)).size(), 6u);
+    }
+}
+
 TEST_P(DeviceTest, DrawsIndirectlyFromArgumentsThatAShaderWrote) {
     const Texture target = make_target(Format::r32_uint, 4, 1);
     const Buffer arguments = must(gpu().create_buffer({.size = 4 * sizeof(DrawArguments),
