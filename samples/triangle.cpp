@@ -3,12 +3,10 @@
 #include <cstdio>
 #include <string>
 
-#include "backends/gl/gl_backend.h"
-#include "backends/vulkan/vulkan_backend.h"
 #include "core/image.h"
-#include "rhi/backend.h"
 #include "rhi/device.h"
 #include "rhi/shader_compiler.h"
+#include "samples/backends.h"
 
 using namespace nacre;
 using namespace nacre::rhi;
@@ -37,11 +35,7 @@ struct Vertex {
 };
 
 Expected<void> draw(const std::string& backend, const std::string& file) {
-    std::vector<std::unique_ptr<Backend>> backends;
-    backends.push_back(vulkan::make_backend());
-    backends.push_back(gl::make_backend());
-    backends.push_back(gl::make_gles_backend());
-    const Instance instance(std::move(backends));
+    const Instance instance(all_backends());
     NACRE_TRY(const std::unique_ptr<Device> device, instance.create_device({.backend = backend}));
 
     ShaderCompiler compiler({});
