@@ -60,14 +60,30 @@ struct PipelineReloader::State {
         return shaders;
     }
 
-    /// Bind groups made for the old pipeline must fit the new one.
-    template <typename Pipeline>
-    Expected<void> check_layouts(Pipeline before, Pipeline after, const std::string& name) {
-        for (std::uint32_t set = 0; set < device.capabilities().max_bind_groups; ++set) {
-            const auto old_layout = device.bind_group_layout(before, set);
-            const auto new_layout = device.bind_group_layout(after, set);
-            if (old_layout.has_value() == new_layout.has_value() && (!old_layout || *old_layout == *new_layout)) continue;
-            return fail(ErrorCode::unsupported, "reload pipeline", fmt::format("'{}'", name),
+    /// Number of bind-group indices up to the highest that the shaders use.
+    [[nodiscard]] std::uint32_t set_count(const std::vector<Shader>& shaders) const {
+        std::uint32_t count = 0;
+        for (const Shader shader : shaders) {
+            const auto reflection = device.reflection(shader);
+            if (reflection && !reflection->bindings.empty())
+                count = std::max(count, reflection->bindings.back().set + 1);
+        }
+        return count;
+    }
+
+    /// Bind groups made for the old pipeline must fit the new one. (Equal layouts are one object.)
+    template <typename Item, typename Pipeline>
+    Expected<void> check_layouts(const Item& before, Pipeline after, const std::vector<Shader>& shaders) const {
+        // Explicit layouts stay; making the pipeline has checked that the shaders fit them.
+        if (!before.desc.bind_group_layouts.empty()) return {};
+        const std::uint32_t old_count = set_count(before.shaders), new_count = set_count(shaders);
+        for (std::uint32_t set = 0; set < std::max(old_count, new_count); ++set) {
+            if (set < std::min(old_count, new_count)) {
+                NACRE_TRY(const BindGroupLayout old_layout, device.bind_group_layout(before.pipeline, set));
+                NACRE_TRY(const BindGroupLayout new_layout, device.bind_group_layout(after, set));
+                if (old_layout == new_layout) continue;
+            }
+            return fail(ErrorCode::unsupported, "reload pipeline", fmt::format("'{}'", before.desc.name),
                         fmt::format("the bindings of set {} have changed, so bind groups in use no longer fit", set),
                         "Undo that change, or start the program again.");
         }
@@ -83,7 +99,7 @@ struct PipelineReloader::State {
             return std::unexpected(pipeline.error());
         }
         if (item.pipeline) {
-            if (auto fits = check_layouts(item.pipeline, *pipeline, item.desc.name); !fits) {
+            if (auto fits = check_layouts(item, *pipeline, shaders); !fits) {
                 device.destroy(*pipeline);
                 destroy(device, shaders);
                 return fits;

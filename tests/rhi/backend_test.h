@@ -6,6 +6,7 @@
 #include <cstring>
 #include <memory>
 #include <mutex>
+#include <ostream>
 #include <span>
 #include <string>
 #include <string_view>
@@ -35,6 +36,9 @@ struct Variant {
     std::string restriction;
     std::string title;        ///< Heading in docs/support.md.
 };
+
+/// How GoogleTest shows a variant.
+inline void PrintTo(const Variant& variant, std::ostream* out) { *out << variant.name; }
 
 /// All variants that the suite knows.
 std::span<const Variant> all_variants();
