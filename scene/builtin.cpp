@@ -147,7 +147,7 @@ Scene cornell_scene() {
     scene.lights.push_back({.name = "lamp", .kind = LightKind::point, .color = {1.0f, 0.85f, 0.6f}, .intensity = 14.0f,
                             .position = {0.0f, 2 * h - 0.35f, 0.0f}});
     scene.environment = studio_environment();
-    scene.environment.intensity = 0.35f;  // the light that the walls would scatter
+    scene.environment.intensity = 0.4f;  // the light that the walls would scatter
     scene.cameras.push_back(camera_at({0.0f, h, 10.6f}, {0.0f, h, 0.0f}, 39.3f));
     return scene;
 }

@@ -45,17 +45,19 @@ glm::vec3 light_of(const SoftBox& lamp, const glm::vec3& direction) {
 }
 
 glm::vec3 studio_light(const glm::vec3& direction) {
-    static constexpr float level = 1.0f;
-    const SoftBox lamps[] = {
-        {{0.1f, 1.0f, 0.35f}, 0.75f, 0.5f, 0.12f, glm::vec3(4.2f, 4.1f, 4.0f) * level},       // overhead
-        {{-0.9f, 0.55f, 0.6f}, 0.32f, 0.45f, 0.06f, glm::vec3(6.5f, 6.1f, 5.6f) * level},     // key, upper left front
-        {{1.0f, 0.2f, 0.35f}, 0.3f, 0.6f, 0.15f, glm::vec3(1.1f, 1.25f, 1.45f) * level},      // fill, right
-        {{0.45f, 0.35f, -1.0f}, 0.08f, 0.5f, 0.05f, glm::vec3(5.0f, 5.0f, 5.2f) * level},     // rim, behind
+    // The part of the room that a camera looking along -Z sees is free of lamps.
+    static const SoftBox lamps[] = {
+        {{0.1f, 1.0f, 0.35f}, 0.75f, 0.5f, 0.15f, {3.1f, 3.05f, 3.0f}},       // overhead
+        {{-0.9f, 0.55f, 0.6f}, 0.32f, 0.45f, 0.08f, {5.0f, 4.75f, 4.4f}},     // key, upper left front
+        {{1.0f, 0.2f, 0.35f}, 0.3f, 0.6f, 0.15f, {1.3f, 1.45f, 1.65f}},       // fill, right
+        {{0.9f, 0.35f, -0.42f}, 0.07f, 0.5f, 0.05f, {4.0f, 4.0f, 4.2f}},      // rim, behind on the right
+        {{-0.95f, 0.25f, -0.3f}, 0.05f, 0.4f, 0.05f, {2.4f, 2.4f, 2.5f}},     // rim, behind on the left
     };
-    // The room: bright-ish walls, darker towards the floor and a little darker under the ceiling.
-    const float wall = 0.30f - 0.06f * std::max(direction.y, 0.0f);
-    const float floor = smooth_step(0.05f, -0.35f, direction.y);
-    glm::vec3 light = glm::mix(glm::vec3(wall) * glm::vec3(1.02f, 1.0f, 0.97f), glm::vec3(0.11f, 0.105f, 0.10f), floor);
+    // The room: walls that are brightest a little above the horizon, a darker floor.
+    const float rise = direction.y - 0.12f;
+    const float wall = 0.30f + 0.34f * std::exp(-rise * rise * 5.0f);
+    const float floor = smooth_step(0.02f, -0.5f, direction.y);
+    glm::vec3 light = glm::mix(wall * glm::vec3(1.01f, 1.0f, 0.98f), glm::vec3(0.20f, 0.195f, 0.19f), floor);
     for (const SoftBox& lamp : lamps) light += light_of(lamp, direction);
     return light;
 }
