@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "rhi/backend.h"
+#include "rhi/command_validator.h"
 #include "rhi/device_state.h"
 
 namespace nacre::rhi {
@@ -54,9 +55,18 @@ Expected<void> CommandList::status() const {
 // Every call but the destructor does nothing on a failed list, and on one that was submitted.
 #define NACRE_RECORD \
     if (!stream_ || !stream_->status) return
+// The same, and the validator has to agree where there is one.
+#define NACRE_RECORD_IF_VALID(check)                              \
+    NACRE_RECORD;                                                 \
+    if (stream_->validator)                                       \
+        if (Check problem = stream_->validator->check) {          \
+            stream_->status = stream_->validator->reject(*problem); \
+            return;                                               \
+        }                                                         \
+    static_assert(true)
 
 void CommandList::begin_render_pass(const RenderPassDesc& desc) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(begin_render_pass(desc));
     const std::uint32_t name = add_string(*stream_, desc.name);
     auto& command = stream_->append<BeginRenderPassCommand>(desc.color.size() * sizeof(ColorAttachmentCommand));
     command.color_count = static_cast<std::uint32_t>(desc.color.size());
@@ -83,29 +93,29 @@ void CommandList::begin_render_pass(const RenderPassDesc& desc) {
 }
 
 void CommandList::end_render_pass() {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(end_render_pass());
     stream_->append<EndRenderPassCommand>();
 }
 
 void CommandList::set_pipeline(GraphicsPipeline pipeline) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(set_pipeline(pipeline));
     stream_->append<SetGraphicsPipelineCommand>().pipeline.handle = pipeline;
 }
 
 void CommandList::set_pipeline(ComputePipeline pipeline) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(set_pipeline(pipeline));
     stream_->append<SetComputePipelineCommand>().pipeline.handle = pipeline;
 }
 
 void CommandList::set_bind_group(std::uint32_t index, BindGroup group) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(set_bind_group(index, group));
     auto& command = stream_->append<SetBindGroupCommand>();
     command.group.handle = group;
     command.index = index;
 }
 
 void CommandList::set_push_constants(std::span<const std::byte> data, std::uint32_t offset) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(set_push_constants(data.size(), offset));
     auto& command = stream_->append<SetPushConstantsCommand>(data.size());
     command.offset = offset;
     command.size = static_cast<std::uint32_t>(data.size());
@@ -113,7 +123,7 @@ void CommandList::set_push_constants(std::span<const std::byte> data, std::uint3
 }
 
 void CommandList::set_vertex_buffer(std::uint32_t slot, Buffer buffer, std::uint64_t offset) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(set_vertex_buffer(slot, buffer, offset));
     auto& command = stream_->append<SetVertexBufferCommand>();
     command.buffer.handle = buffer;
     command.offset = offset;
@@ -121,7 +131,7 @@ void CommandList::set_vertex_buffer(std::uint32_t slot, Buffer buffer, std::uint
 }
 
 void CommandList::set_index_buffer(Buffer buffer, IndexType type, std::uint64_t offset) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(set_index_buffer(buffer, type, offset));
     auto& command = stream_->append<SetIndexBufferCommand>();
     command.buffer.handle = buffer;
     command.offset = offset;
@@ -129,37 +139,37 @@ void CommandList::set_index_buffer(Buffer buffer, IndexType type, std::uint64_t 
 }
 
 void CommandList::set_viewport(const Viewport& viewport) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(set_viewport(viewport));
     stream_->append<SetViewportCommand>().viewport = viewport;
 }
 
 void CommandList::set_scissor(const Rectangle& scissor) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(set_scissor(scissor));
     stream_->append<SetScissorCommand>().scissor = scissor;
 }
 
 void CommandList::set_stencil_reference(std::uint8_t reference) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(set_pass_state("set stencil reference"));
     stream_->append<SetStencilReferenceCommand>().reference = reference;
 }
 
 void CommandList::set_blend_constants(std::array<float, 4> constants) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(set_pass_state("set blend constants"));
     stream_->append<SetBlendConstantsCommand>().constants = constants;
 }
 
 void CommandList::draw(const DrawArguments& arguments) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(draw(arguments));
     stream_->append<DrawCommand>().arguments = arguments;
 }
 
 void CommandList::draw_indexed(const DrawIndexedArguments& arguments) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(draw_indexed(arguments));
     stream_->append<DrawIndexedCommand>().arguments = arguments;
 }
 
 void CommandList::draw_indirect(Buffer arguments, std::uint64_t offset, std::uint32_t count, std::uint32_t stride) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(draw_indirect(arguments, offset, count, stride, false));
     auto& command = stream_->append<DrawIndirectCommand>();
     command.arguments.handle = arguments;
     command.offset = offset;
@@ -169,7 +179,7 @@ void CommandList::draw_indirect(Buffer arguments, std::uint64_t offset, std::uin
 
 void CommandList::draw_indexed_indirect(Buffer arguments, std::uint64_t offset, std::uint32_t count,
                                         std::uint32_t stride) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(draw_indirect(arguments, offset, count, stride, true));
     auto& command = stream_->append<DrawIndexedIndirectCommand>();
     command.arguments.handle = arguments;
     command.offset = offset;
@@ -178,12 +188,12 @@ void CommandList::draw_indexed_indirect(Buffer arguments, std::uint64_t offset, 
 }
 
 void CommandList::dispatch(const DispatchArguments& groups) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(dispatch(groups));
     stream_->append<DispatchCommand>().groups = groups;
 }
 
 void CommandList::dispatch_indirect(Buffer arguments, std::uint64_t offset) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(dispatch_indirect(arguments, offset));
     auto& command = stream_->append<DispatchIndirectCommand>();
     command.arguments.handle = arguments;
     command.offset = offset;
@@ -191,7 +201,8 @@ void CommandList::dispatch_indirect(Buffer arguments, std::uint64_t offset) {
 
 void CommandList::copy_buffer(Buffer source, std::uint64_t source_offset, Buffer destination,
                               std::uint64_t destination_offset, std::uint64_t size) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(copy_buffer(source, source_offset, destination, destination_offset, size));
+    if (size == 0) return;
     auto& command = stream_->append<CopyBufferCommand>();
     command.source.handle = source;
     command.destination.handle = destination;
@@ -201,7 +212,7 @@ void CommandList::copy_buffer(Buffer source, std::uint64_t source_offset, Buffer
 }
 
 void CommandList::copy_buffer_to_texture(Buffer source, Texture destination, const BufferTextureCopy& region) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(copy_buffer_and_texture(source, destination, region, true));
     auto& command = stream_->append<CopyBufferToTextureCommand>();
     command.source.handle = source;
     command.destination.handle = destination;
@@ -209,7 +220,7 @@ void CommandList::copy_buffer_to_texture(Buffer source, Texture destination, con
 }
 
 void CommandList::copy_texture_to_buffer(Texture source, Buffer destination, const BufferTextureCopy& region) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(copy_buffer_and_texture(destination, source, region, false));
     auto& command = stream_->append<CopyTextureToBufferCommand>();
     command.source.handle = source;
     command.destination.handle = destination;
@@ -217,7 +228,7 @@ void CommandList::copy_texture_to_buffer(Texture source, Buffer destination, con
 }
 
 void CommandList::copy_texture(Texture source, Texture destination, const TextureCopy& region) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(copy_texture(source, destination, region));
     auto& command = stream_->append<CopyTextureCommand>();
     command.source.handle = source;
     command.destination.handle = destination;
@@ -225,7 +236,8 @@ void CommandList::copy_texture(Texture source, Texture destination, const Textur
 }
 
 void CommandList::fill_buffer(Buffer buffer, std::uint32_t value, std::uint64_t offset, std::uint64_t size) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(fill_buffer(buffer, offset, size));
+    if (size == 0) return;
     auto& command = stream_->append<FillBufferCommand>();
     command.buffer.handle = buffer;
     command.offset = offset;
@@ -234,14 +246,14 @@ void CommandList::fill_buffer(Buffer buffer, std::uint32_t value, std::uint64_t 
 }
 
 void CommandList::clear_texture(const TextureView& view, ClearColor color) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(clear(view, false));
     auto& command = stream_->append<ClearTextureCommand>();
     command.view = record(view);
     command.color = color;
 }
 
 void CommandList::clear_depth_stencil(const TextureView& view, float depth, std::uint8_t stencil) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(clear(view, true));
     auto& command = stream_->append<ClearDepthStencilCommand>();
     command.view = record(view);
     command.depth = depth;
@@ -249,44 +261,44 @@ void CommandList::clear_depth_stencil(const TextureView& view, float depth, std:
 }
 
 void CommandList::generate_mips(Texture texture) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(generate_mips(texture));
     stream_->append<GenerateMipsCommand>().texture.handle = texture;
 }
 
 void CommandList::write_timestamp(QueryPool pool, std::uint32_t index) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(write_timestamp(pool, index));
     auto& command = stream_->append<WriteTimestampCommand>();
     command.pool.handle = pool;
     command.index = index;
 }
 
 void CommandList::begin_occlusion_query(QueryPool pool, std::uint32_t index) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(begin_occlusion_query(pool, index));
     auto& command = stream_->append<BeginOcclusionQueryCommand>();
     command.pool.handle = pool;
     command.index = index;
 }
 
 void CommandList::end_occlusion_query(QueryPool pool, std::uint32_t index) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(end_occlusion_query(pool, index));
     auto& command = stream_->append<EndOcclusionQueryCommand>();
     command.pool.handle = pool;
     command.index = index;
 }
 
 void CommandList::push_debug_group(std::string_view name) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(push_debug_group());
     const std::uint32_t index = add_string(*stream_, name);
     stream_->append<PushDebugGroupCommand>().name = index;
 }
 
 void CommandList::pop_debug_group() {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(pop_debug_group());
     stream_->append<PopDebugGroupCommand>();
 }
 
 void CommandList::begin_statement(std::string_view pass, std::span<const StatedAccess> accesses) {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(begin_statement());
     const std::uint32_t name = add_string(*stream_, pass);
     auto& command = stream_->append<BeginStatementCommand>(accesses.size_bytes());
     command.name = name;
@@ -295,10 +307,11 @@ void CommandList::begin_statement(std::string_view pass, std::span<const StatedA
 }
 
 void CommandList::end_statement() {
-    NACRE_RECORD;
+    NACRE_RECORD_IF_VALID(end_statement());
     stream_->append<EndStatementCommand>();
 }
 
+#undef NACRE_RECORD_IF_VALID
 #undef NACRE_RECORD
 
 }  // namespace nacre::rhi

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "rhi/command_validator.h"
 #include "rhi/device_access.h"
 
 namespace nacre::rhi {
@@ -45,6 +46,8 @@ CommandList Device::create_command_list(std::string_view name) {
     stream->name = name;
     stream->device = state_->number;
     stream->pool = state_->shared->streams;
+    if (state_->shared->desc.validation)
+        stream->validator = std::make_shared<CommandValidator>(state_->shared, stream->name);
     return CommandList(std::move(stream));
 }
 
@@ -79,6 +82,8 @@ Expected<Fence> Device::submit(std::span<CommandList> lists) {
                                   "expected a list of this device, found one of another",
                                   "Record the list with create_command_list of the device that it is submitted to."});
         }
+        if (stream->status && stream->validator)
+            if (Check open = stream->validator->finish()) stream->status = stream->validator->reject(std::move(*open));
         if (!stream->status) {
             Error error = stream->status.error();
             give_back();
