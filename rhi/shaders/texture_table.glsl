@@ -180,10 +180,14 @@ ivec2 table_texture_size(uint index, int mip) {
 
 #endif
 
-// Derivatives are taken before the page is chosen: after it, the neighbors in a quad may be elsewhere.
 #ifdef NACRE_FRAGMENT_STAGE
 vec4 sample_table(uint index, vec2 uv) {
+#if NACRE_TEXTURE_TABLE_PAGES == 0
+    return texture(nacre_table_textures[nonuniformEXT(nacre_table_index(index))], uv);
+#else
+    // Derivatives are taken before the page is chosen: after it, the neighbors in a quad may be elsewhere.
     return sample_table_grad(index, uv, dFdx(uv), dFdy(uv));
+#endif
 }
 #endif
 
