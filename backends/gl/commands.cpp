@@ -118,6 +118,7 @@ void Executor::destroy() {
     if (small_indirect_) gl_.DeleteBuffers(1, &small_indirect_);
     if (shifted_indices_) gl_.DeleteBuffers(1, &shifted_indices_);
     transfer_.destroy();
+    provoking_vertex_.destroy();
 }
 
 void Executor::execute(const CommandHeader& header, const std::byte* payload, const FlatPlan& plan) {

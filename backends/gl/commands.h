@@ -8,6 +8,7 @@
 
 #include "backends/gl/bind_group.h"
 #include "backends/gl/pipeline.h"
+#include "backends/gl/provoking_vertex.h"
 #include "backends/gl/query_pool.h"
 #include "backends/gl/transfer.h"
 
@@ -33,7 +34,7 @@ FlatPlan flatten(const rhi::ExecutionPlan& plan);
 /// Executes plans; worker thread only.
 class Executor {
   public:
-    explicit Executor(Driver& driver) : driver_(driver), gl_(driver.gl), transfer_(driver) {}
+    explicit Executor(Driver& driver) : driver_(driver), gl_(driver.gl), transfer_(driver), provoking_vertex_(driver) {}
     void execute(const FlatPlan& plan);
     void destroy();
 
@@ -58,6 +59,9 @@ class Executor {
     void bind_index_buffer();
     void use_program(GLuint name);
     void set_base_instance(std::uint32_t first_instance);
+    /// True where flat values need the corners of triangles turned.
+    [[nodiscard]] bool turns_corners() const;
+    void draw_turned(const ProvokingVertex::Draw& draw, std::uint32_t instances, std::uint32_t first_instance);
     void draw(const rhi::DrawArguments& arguments);
     void draw_indexed(const rhi::DrawIndexedArguments& arguments);
     void draw_indirect(const rhi::DrawIndirectCommand& command);
@@ -67,6 +71,7 @@ class Executor {
     Driver& driver_;
     const Functions& gl_;
     Transfer transfer_;
+    ProvokingVertex provoking_vertex_;
 
     // What the list has set.
     GlGraphicsPipeline* pipeline_ = nullptr;

@@ -168,8 +168,33 @@ void Executor::set_base_instance(std::uint32_t first_instance) {
     if (location >= 0) gl_.Uniform1i(location, static_cast<GLint>(first_instance));
 }
 
+bool Executor::turns_corners() const {
+    return pipeline_ && driver_.traits.es && pipeline_->program->flat_inputs &&
+           (pipeline_->desc.topology == rhi::Topology::triangle_list ||
+            pipeline_->desc.topology == rhi::Topology::triangle_strip);
+}
+
+void Executor::draw_turned(const ProvokingVertex::Draw& draw, std::uint32_t instances, std::uint32_t first_instance) {
+    const auto count = static_cast<GLsizei>(provoking_vertex_.turn(draw));
+    groups_changed_ = true;  // Two storage buffers are bound to others now.
+    if (count == 0 || !prepare_draw()) return;
+    gl_.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, provoking_vertex_.indices());
+    pipeline_->bound_index_buffer = 0;
+    set_base_instance(first_instance);
+    if (first_instance != 0)
+        gl_.DrawElementsInstancedBaseVertexBaseInstance(GL_TRIANGLES, count, GL_UNSIGNED_INT, nullptr,
+                                                        static_cast<GLsizei>(instances), 0, first_instance);
+    else
+        gl_.DrawElementsInstanced(GL_TRIANGLES, count, GL_UNSIGNED_INT, nullptr, static_cast<GLsizei>(instances));
+}
+
 void Executor::draw(const rhi::DrawArguments& arguments) {
-    if (arguments.vertex_count == 0 || arguments.instance_count == 0 || !prepare_draw()) return;
+    if (arguments.vertex_count == 0 || arguments.instance_count == 0) return;
+    if (turns_corners())
+        return draw_turned({.strip = pipeline_->desc.topology == rhi::Topology::triangle_strip,
+                            .count = arguments.vertex_count, .first = arguments.first_vertex},
+                           arguments.instance_count, arguments.first_instance);
+    if (!prepare_draw()) return;
     set_base_instance(arguments.first_instance);
     const auto first = static_cast<GLint>(arguments.first_vertex);
     const auto vertices = static_cast<GLsizei>(arguments.vertex_count);
@@ -181,7 +206,17 @@ void Executor::draw(const rhi::DrawArguments& arguments) {
 }
 
 void Executor::draw_indexed(const rhi::DrawIndexedArguments& arguments) {
-    if (arguments.index_count == 0 || arguments.instance_count == 0 || !index_buffer_ || !prepare_draw()) return;
+    if (arguments.index_count == 0 || arguments.instance_count == 0 || !index_buffer_) return;
+    if (turns_corners())
+        return draw_turned(
+            {.strip = pipeline_->desc.topology == rhi::Topology::triangle_strip,
+             .count = arguments.index_count,
+             .first = static_cast<std::uint32_t>(index_offset_ / index_bytes(index_type_)) + arguments.first_index,
+             .vertex_offset = arguments.vertex_offset,
+             .indices = index_buffer_,
+             .wide_indices = index_type_ == rhi::IndexType::uint32},
+            arguments.instance_count, arguments.first_instance);
+    if (!prepare_draw()) return;
     bind_index_buffer();
     set_base_instance(arguments.first_instance);
     const GLenum type = index_name(index_type_);

@@ -363,6 +363,8 @@ Expected<std::unique_ptr<Program>> make_program(const DriverPointer& driver, con
         SlotAllocator slots;
         for (const rhi::BackendShader* stage : stages) {
             NACRE_TRY(Translation translation, translate(*stage, specialization, driver->traits, slots));
+            if (log_is_on(LogLevel::trace))
+                log_message(LogLevel::trace, fmt::format("translation of '{}':\n{}", stage->name, translation.source));
             stored.stages.push_back(std::move(translation));
         }
     }

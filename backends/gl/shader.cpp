@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <spirv_cross/spirv_cross_c.h>
 
+#include <algorithm>
 #include <bit>
 #include <cctype>
 #include <memory>
@@ -185,6 +186,7 @@ class Translator {
                         : fmt::format("texture_{}_{}_{}", letter_, range.set, range.binding).c_str());
             spvc_compiler_set_decoration(compiler_, pairs[i].combined_id, SpvDecorationBinding, range.first);
             result_.textures.push_back(range);
+            combined_.push_back(pairs[i].combined_id);
         }
         return {};
     }
@@ -236,6 +238,8 @@ class Translator {
     }
 
     Expected<void> place_combined(const spvc_reflected_resource& resource) {
+        // The list of what the module declares holds the pairs made above as well.
+        if (std::ranges::find(combined_, resource.id) != combined_.end()) return {};
         TextureRange range;
         range.combined = true;
         std::tie(range.set, range.binding) = place_of(resource.id);
@@ -363,6 +367,7 @@ class Translator {
     const char letter_;
     CrossContext context_;
     spvc_compiler compiler_ = nullptr;
+    std::vector<SpvId> combined_;  ///< Pairs of a texture and a sampler.
     Translation result_;
 };
 
