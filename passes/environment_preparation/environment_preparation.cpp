@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fmt/format.h>
 #include <glm/gtc/packing.hpp>
+#include <map>
 
 namespace nacre::passes {
 
@@ -20,14 +21,14 @@ struct Temporary {
     explicit Temporary(rhi::Device& d) : device(d) {}
     ~Temporary() {
         for (const auto group : groups) device.destroy(group);
-        for (const auto pipeline : pipelines) device.destroy(pipeline);
+        for (const auto& [path, pipeline] : pipelines) device.destroy(pipeline);
         for (const auto sampler : samplers) device.destroy(sampler);
         for (const auto texture : textures) device.destroy(texture);
         if (parameters) device.destroy(parameters);
     }
     rhi::Device& device;
     std::vector<rhi::BindGroup> groups;
-    std::vector<rhi::ComputePipeline> pipelines;
+    std::map<std::string, rhi::ComputePipeline> pipelines;  // by path; each has one set of defines here
     std::vector<rhi::Sampler> samplers;
     std::vector<rhi::Texture> textures;
     rhi::Buffer parameters{};
@@ -42,8 +43,12 @@ Expected<Step> make_step(Temporary& temporary, ShaderLibrary& shaders, const std
                          const rhi::ShaderSource& source, std::vector<rhi::BindGroupEntry> entries) {
     Step step;
     NACRE_TRY(const rhi::Shader shader, shaders.get(pass, source));
-    NACRE_TRY(step.pipeline, temporary.device.create_compute_pipeline({.shader = shader, .name = source.path}));
-    temporary.pipelines.push_back(step.pipeline);
+    if (const auto known = temporary.pipelines.find(source.path); known != temporary.pipelines.end()) {
+        step.pipeline = known->second;
+    } else {
+        NACRE_TRY(step.pipeline, temporary.device.create_compute_pipeline({.shader = shader, .name = source.path}));
+        temporary.pipelines.emplace(source.path, step.pipeline);
+    }
     NACRE_TRY(const rhi::BindGroupLayout layout, temporary.device.bind_group_layout(step.pipeline, 0));
     NACRE_TRY(step.group,
               temporary.device.create_bind_group({.layout = layout, .entries = std::move(entries), .name = pass}));
@@ -51,10 +56,36 @@ Expected<Step> make_step(Temporary& temporary, ShaderLibrary& shaders, const std
     return step;
 }
 
+/// Halves of what is clamped to their range.
+std::vector<std::uint64_t> half_floats(const std::vector<glm::vec4>& texels) {
+    std::vector<std::uint64_t> halves;
+    halves.reserve(texels.size());
+    for (const glm::vec4& texel : texels) {
+        halves.push_back(glm::packHalf4x16(glm::clamp(texel, glm::vec4(0.0f), glm::vec4(65504.0f))));
+    }
+    return halves;
+}
+
+/// The next mip by a 2 x 2 box. Made here and not by the device: one with the guarantees of OpenGL ES 3.1 only can neither draw
+/// into float textures, nor fill their mips, nor sample one mip of a texture while it writes another.
+std::vector<glm::vec4> halved(const std::vector<glm::vec4>& texels, const rhi::Extent3D& from, const rhi::Extent3D& to) {
+    std::vector<glm::vec4> result;
+    result.reserve(std::size_t{to.width} * to.height);
+    for (std::uint32_t y = 0; y < to.height; ++y) {
+        for (std::uint32_t x = 0; x < to.width; ++x) {
+            const std::size_t x0 = std::min(2 * x, from.width - 1), x1 = std::min(2 * x + 1, from.width - 1);
+            const std::size_t y0 = std::size_t{std::min(2 * y, from.height - 1)} * from.width;
+            const std::size_t y1 = std::size_t{std::min(2 * y + 1, from.height - 1)} * from.width;
+            result.push_back(0.25f * (texels[y0 + x0] + texels[y0 + x1] + texels[y1 + x0] + texels[y1 + x1]));
+        }
+    }
+    return result;
+}
+
 /// All faces of one mip, as images see them.
 rhi::TextureView faces(rhi::Texture cube, std::uint32_t mip) {
     rhi::TextureView view(cube);
-    view.dimension = rhi::ViewDimension::d2_array;
+    view.dimension = rhi::ViewDimension::cube;
     view.base_mip = mip;
     view.mip_count = 1;
     return view;
@@ -80,15 +111,6 @@ Expected<std::unique_ptr<PreparedEnvironment>> PreparedEnvironment::create(rhi::
     const std::uint32_t size = present ? face_size(environment.width, largest_size) : 16;
     const std::uint32_t mips = mip_count(size);
 
-    // The picture, in halves: what comes in is at most 65,504.
-    std::vector<std::uint16_t> halves(present ? environment.texels.size() * 4 : 4, std::uint16_t{0});
-    if (present) {
-        for (std::size_t i = 0; i < environment.texels.size(); ++i) {
-            const glm::vec4 texel = glm::clamp(environment.texels[i], glm::vec4(0.0f), glm::vec4(65504.0f));
-            const std::uint64_t packed = glm::packHalf4x16(texel);
-            std::memcpy(&halves[i * 4], &packed, sizeof(packed));
-        }
-    }
     const std::uint32_t width = present ? environment.width : 1, height = present ? environment.height : 1;
     if (width > device.capabilities().max_texture_2d || height > device.capabilities().max_texture_2d) {
         return fail(ErrorCode::unsupported, "upload environment", fmt::format("'{}'", environment.name),
@@ -100,12 +122,16 @@ Expected<std::unique_ptr<PreparedEnvironment>> PreparedEnvironment::create(rhi::
                                         .width = width,
                                         .height = height,
                                         .mips = rhi::full_mip_count(width, height),
-                                        .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::copy_destination |
-                                                 rhi::TextureUsage::copy_source,
+                                        .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::copy_destination,
                                         .name = "environment picture"};
     NACRE_TRY(const rhi::Texture picture, device.create_texture(picture_desc));
     temporary.textures.push_back(picture);
-    NACRE_CHECK(device.write_texture(picture, std::as_bytes(std::span(halves))));
+    std::vector<glm::vec4> texels = present ? environment.texels : std::vector<glm::vec4>(1, glm::vec4(0.0f));
+    for (std::uint32_t mip = 0; mip < picture_desc.mips; ++mip) {
+        if (mip > 0) texels = halved(texels, rhi::mip_extent(picture_desc, mip - 1), rhi::mip_extent(picture_desc, mip));
+        const std::vector<std::uint64_t> halves = half_floats(texels);
+        NACRE_CHECK(device.write_texture(picture, std::as_bytes(std::span(halves)), mip));
+    }
 
     rhi::TextureDesc source_desc{.dimension = rhi::TextureDimension::cube,
                                  .format = rhi::Format::rgba16_float,
@@ -113,8 +139,7 @@ Expected<std::unique_ptr<PreparedEnvironment>> PreparedEnvironment::create(rhi::
                                  .height = size,
                                  .layers = 6,
                                  .mips = rhi::full_mip_count(size, size),
-                                 .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::storage |
-                                          rhi::TextureUsage::copy_source | rhi::TextureUsage::copy_destination,
+                                 .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::storage | rhi::TextureUsage::copy_source,
                                  .name = "environment cube"};
     NACRE_TRY(const rhi::Texture source, device.create_texture(source_desc));
     temporary.textures.push_back(source);
@@ -148,6 +173,7 @@ Expected<std::unique_ptr<PreparedEnvironment>> PreparedEnvironment::create(rhi::
     NACRE_TRY(const rhi::Sampler cube_sampler, device.create_sampler(around));
     temporary.samplers.push_back(cube_sampler);
 
+    // The functions below refer to what lives in this function only: the graph is recorded here once, then only looked at.
     FrameGraph& graph = result->graph_;
     const TextureId picture_id = graph.import_texture(picture, picture_desc);
     const TextureId source_id = graph.import_texture(source, source_desc);
@@ -156,26 +182,29 @@ Expected<std::unique_ptr<PreparedEnvironment>> PreparedEnvironment::create(rhi::
     const BufferId parameters_id = graph.import_buffer(temporary.parameters, {.size = blocks.size(), .name = "environment parameters"});
     const auto groups_for = [](std::uint32_t side) { return rhi::DispatchArguments{(side + 7) / 8, (side + 7) / 8, 6}; };
 
+    // Every mip of the source comes from the mip of the picture whose texels are as large; roughness 0 mirrors the first.
     const std::string to_cube = "environment to cube";
-    NACRE_TRY(const Step convert,
-              make_step(temporary, shaders, to_cube,
-                        {.path = "passes/environment_preparation/equirectangular_to_cube.comp"},
-                        {{.binding = 0, .texture = picture, .sampler = picture_sampler},
-                         {.binding = 1, .texture = faces(source, 0)},
-                         {.binding = 2, .buffer = temporary.parameters, .size = 16}}));
+    std::vector<Step> conversions;
+    for (std::uint32_t mip = 0; mip <= source_desc.mips; ++mip) {
+        const rhi::TextureView target = mip < source_desc.mips ? faces(source, mip) : faces(result->cube_, 0);
+        NACRE_TRY(conversions.emplace_back(),
+                  make_step(temporary, shaders, to_cube,
+                            {.path = "passes/environment_preparation/equirectangular_to_cube.comp"},
+                            {{.binding = 0, .texture = picture, .sampler = picture_sampler},
+                             {.binding = 1, .texture = target},
+                             {.binding = 2, .buffer = temporary.parameters, .size = 16}}));
+    }
     graph.add_pass(to_cube)
-        .uses(picture_id, ResourceUse::sampled | ResourceUse::copy_destination)
+        .uses(picture_id, ResourceUse::sampled)
         .uses(parameters_id, ResourceUse::uniform_buffer)
-        .uses(source_id, ResourceUse::storage_write | ResourceUse::copy_source | ResourceUse::copy_destination)
-        .uses(cube_id, ResourceUse::copy_destination)
+        .uses(source_id, ResourceUse::storage_write)
+        .uses(cube_id, ResourceUse::storage_write)
         .records([&](PassContext& pass) {
-            if (picture_desc.mips > 1) pass.list.generate_mips(picture);
-            pass.list.set_pipeline(convert.pipeline);
-            pass.list.set_bind_group(0, convert.group);
-            pass.list.dispatch(groups_for(size));
-            pass.list.generate_mips(source);
-            // Roughness 0 mirrors the environment itself.
-            pass.list.copy_texture(source, result->cube_, {.extent = {size, size, 1}, .layer_count = 6});
+            for (std::uint32_t mip = 0; mip <= source_desc.mips; ++mip) {
+                pass.list.set_pipeline(conversions[mip].pipeline);
+                pass.list.set_bind_group(0, conversions[mip].group);
+                pass.list.dispatch(groups_for(mip < source_desc.mips ? std::max(size >> mip, 1u) : size));
+            }
         });
 
     const std::string prefilter = "environment prefiltering";

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 460
-// Mip 0 of the environment cube from an equirectangular picture with mips.
+// A mip of the environment cube from an equirectangular picture with mips.
 #include "passes/shared/cube.glsl"
 #include "passes/shared/ggx.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0) uniform sampler2D equirectangular;
-layout(set = 0, binding = 1, rgba16f) uniform writeonly image2DArray cube;
+layout(set = 0, binding = 1, rgba16f) uniform writeonly imageCube cube;
 layout(set = 0, binding = 2, std140) uniform EnvironmentBlock { vec4 parameters; };  // rotation, intensity
 
 void main() {

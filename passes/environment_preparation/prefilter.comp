@@ -8,7 +8,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0) uniform samplerCube environment;
-layout(set = 0, binding = 1, rgba16f) uniform writeonly image2DArray mip;
+layout(set = 0, binding = 1, rgba16f) uniform writeonly imageCube mip;
 layout(set = 0, binding = 2, std140) uniform PrefilterBlock { vec4 parameters; };  // roughness
 
 float radical_inverse(uint bits) {
