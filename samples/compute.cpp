@@ -45,7 +45,9 @@ Expected<void> sum(const std::string& backend) {
     std::iota(numbers.begin(), numbers.end(), 1u);
     NACRE_TRY(const Buffer input, device->create_buffer({.size = numbers.size() * 4, .usage = BufferUsage::storage,
                                                          .name = "numbers"}));
-    NACRE_TRY(const Buffer total, device->create_buffer({.size = 4, .usage = BufferUsage::storage, .name = "total"}));
+    NACRE_TRY(const Buffer total, device->create_buffer({.size = 4,
+                                                         .usage = BufferUsage::storage | BufferUsage::copy_destination,
+                                                         .name = "total"}));
     NACRE_CHECK(device->write_buffer(input, std::span<const std::uint32_t>(numbers)));
     NACRE_TRY(const BindGroupLayout layout, device->bind_group_layout(pipeline, 0));
     NACRE_TRY(const BindGroup group, device->create_bind_group({.layout = layout,

@@ -71,8 +71,24 @@ TEST(SmallSamples, TheSumIsRight) {
     }
 }
 
+TEST(SmallSamples, ThePassDarkensTheCorners) {
+    const auto backends = backends_here();
+    if (backends.empty()) GTEST_SKIP() << "no backend is here";
+    const ImageBytes first = picture_of(PASS_SAMPLE, *backends.begin());
+    ASSERT_EQ(first.width, 320u);
+    for (const auto& [x, y] : {std::pair(0u, 0u), {319u, 239u}, {160u, 120u}, {40u, 200u}}) {
+        const double u = (x + 0.5) / 160 - 1, v = (y + 0.5) / 120 - 1;
+        const double light = 1 - 0.4 * (u * u + v * v);
+        const double red = (x / 20 + y / 20) % 2 == 0 ? 255 : 100;
+        EXPECT_NEAR(first.bytes[(y * 320 + x) * 4], red * light, 1.0) << x << ", " << y;
+        EXPECT_NEAR(first.bytes[(y * 320 + x) * 4 + 1], 255 * light, 1.0) << x << ", " << y;
+    }
+    for (const std::string& backend : backends)
+        EXPECT_EQ(different_texels(first, picture_of(PASS_SAMPLE, backend)), 0u) << backend;
+}
+
 TEST(SmallSamples, AnUnknownBackendIsAnError) {
-    for (const char* program : {TRIANGLE_SAMPLE, COMPUTE_SAMPLE}) {
+    for (const char* program : {TRIANGLE_SAMPLE, COMPUTE_SAMPLE, PASS_SAMPLE}) {
         const CommandResult result = run_program(program, {"crayons"});
         EXPECT_EQ(result.exit_code, 1);
         EXPECT_THAT(result.errors, HasSubstr("'crayons'"));
