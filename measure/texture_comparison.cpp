@@ -38,6 +38,14 @@ void direction_of(double u, double v, double (&direction)[3]) {
     direction[2] = z / length;
 }
 
+// Largest magnitude of an octahedral coordinate's code once its offset is taken away.
+std::int64_t half_range_of(const BitField& field) { return (std::int64_t{1} << (field.bits / 2 - 1)) - 1; }
+
+void direction_of_codes(const BitField& field, std::int64_t x, std::int64_t y, double (&direction)[3]) {
+    const auto half_range = static_cast<double>(half_range_of(field));
+    direction_of(double(x) / half_range - 1.0, double(y) / half_range - 1.0, direction);
+}
+
 double angle_between(const double (&a)[3], const double (&b)[3]) {
     // The chord keeps its precision for the tiny angles that matter here; acos of the cosine does not.
     const double chord = std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
@@ -54,7 +62,7 @@ struct FieldStep {
 // the angle decides: it may be as large as the largest to one of the eight neighboring codes.
 FieldStep compare_octahedral(const BitField& field, std::uint32_t word_a, std::uint32_t word_b) {
     const std::uint32_t half = field.bits / 2;
-    const auto largest = static_cast<std::int64_t>(mask_of(half));
+    const std::int64_t largest = 2 * half_range_of(field);
     const std::uint32_t code_a = code_of(field, word_a), code_b = code_of(field, word_b);
     const auto xa = static_cast<std::int64_t>(code_a & mask_of(half)), ya = static_cast<std::int64_t>(code_a >> half);
     const auto xb = static_cast<std::int64_t>(code_b & mask_of(half)), yb = static_cast<std::int64_t>(code_b >> half);
@@ -69,7 +77,7 @@ FieldStep compare_octahedral(const BitField& field, std::uint32_t word_a, std::u
             const std::int64_t x = xa + dx, y = ya + dy;
             if (x < 0 || y < 0 || x > largest || y > largest) continue;
             double neighbor[3];
-            direction_of(2.0 * double(x) / double(largest) - 1.0, 2.0 * double(y) / double(largest) - 1.0, neighbor);
+            direction_of_codes(field, x, y, neighbor);
             step = std::max(step, angle_between(a, neighbor));
         }
     }
@@ -122,7 +130,7 @@ Expected<void> check_texture(const TextureData& texture) {
     for (const BitField& field : texture.fields) {
         const bool fits = field.bits >= 1 && field.bits <= 32 && field.shift < 32 && field.shift + field.bits <= 32 &&
                           field.channel < format.channels && format.block_bytes == 4 * format.channels;
-        const bool even = field.kind != FieldKind::octahedral || field.bits % 2 == 0;
+        const bool even = field.kind != FieldKind::octahedral || (field.bits % 2 == 0 && field.bits >= 4);
         if (!fits || !even || (field.kind == FieldKind::snorm && field.bits < 2)) {
             return wrong(ErrorCode::invalid_argument,
                          fmt::format("field '{}' ({} bits at bit {} of channel {}) does not fit format {}", field.name,
@@ -223,9 +231,7 @@ double decode_field(const BitField& field, std::uint32_t word) {
 void decode_octahedral(const BitField& field, std::uint32_t word, double (&direction)[3]) {
     const std::uint32_t half = field.bits / 2;
     const std::uint32_t code = code_of(field, word);
-    const double largest = mask_of(half);
-    direction_of(2.0 * double(code & mask_of(half)) / largest - 1.0, 2.0 * double(code >> half) / largest - 1.0,
-                 direction);
+    direction_of_codes(field, code & mask_of(half), code >> half, direction);
 }
 
 Expected<TextureDifference> compare_textures(const TextureData& reference, const TextureData& test) {

@@ -31,7 +31,8 @@ enum class FieldKind : std::uint8_t {
     snorm,         ///< Two's complement, code / (2^(bits-1) - 1); a step is one code.
     ufloat,        ///< Unsigned float of any layout, or any code that grows with its value; a step is one code.
     circular,      ///< code / 2^bits of a turn; a step is one code, the last code neighbors the first.
-    octahedral,    ///< A direction: x in the lower half of the bits, y in the upper, unorm each (`bits` even).
+    octahedral,    ///< A direction: x in the lower half of the bits, y in the upper (`bits` even); with h bits each, codes
+                   ///< 0 to 2^h - 2 are [-1, 1], so that -1, 0 and 1 are exact (Meyer et al. 2010).
 };
 
 /// "uint", "unorm", ... as in JSON.
