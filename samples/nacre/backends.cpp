@@ -3,28 +3,15 @@
 
 #include <algorithm>
 
-#include "backends/gl/gl_backend.h"
-#include "backends/vulkan/vulkan_backend.h"
 #include "rhi/backend.h"
+#include "samples/backends.h"
 
 namespace nacre::command {
-namespace {
-
-std::vector<std::unique_ptr<rhi::Backend>> make_backends() {
-    std::vector<std::unique_ptr<rhi::Backend>> backends;
-    backends.push_back(vulkan::make_backend());
-    backends.push_back(gl::make_backend());
-    backends.push_back(gl::make_es_backend());
-    return backends;
-}
-
-}  // namespace
-
-std::unique_ptr<rhi::Instance> make_instance() { return std::make_unique<rhi::Instance>(make_backends()); }
+std::unique_ptr<rhi::Instance> make_instance() { return std::make_unique<rhi::Instance>(all_backends()); }
 
 std::vector<std::string> backend_names() {
     std::vector<std::string> names;
-    for (const auto& backend : make_backends()) names.emplace_back(backend->name());
+    for (const auto& backend : all_backends()) names.emplace_back(backend->name());
     return names;
 }
 

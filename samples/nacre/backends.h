@@ -8,7 +8,7 @@
 #include "rhi/device.h"
 
 /// @file
-/// The one list of backends that the command is built with.
+/// What the command asks of the list of backends (samples/backends.h).
 
 namespace nacre::command {
 
