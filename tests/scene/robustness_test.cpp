@@ -383,6 +383,20 @@ TEST(Limits, PicturesAreRefusedBeforeTheyAreDecoded) {
     EXPECT_THAT(error_of(file.load(options)), HasSubstr("image 0 'paint'"));
 }
 
+TEST(Limits, PicturesCountTogether) {
+    GltfBuilder file;
+    add_picture(file, picture_uri(png_text(64)));
+    file.json["images"].push_back({{"uri", picture_uri(png_text(32))}, {"name", "second"}});
+    file.json["textures"].push_back({{"source", 1}});
+    file.json["materials"][0]["normalTexture"] = {{"index", 1}};
+    LoadOptions options;
+    options.limits.image_bytes = (64 * 64 + 32 * 32) * 4;
+    const Expected<Scene> fitting = file.load(options);
+    EXPECT_TRUE(fitting) << error_of(fitting);
+    options.limits.image_bytes -= 1;
+    EXPECT_THAT(error_of(file.load(options)), HasSubstr("pictures of the scene need more than"));
+}
+
 TEST(Limits, JsonAndGeometryAreHeldToTheirLimits) {
     const GltfBuilder file;
     LoadOptions options;
