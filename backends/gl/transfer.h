@@ -12,7 +12,7 @@
 /// Desktop OpenGL copies every format between buffers and textures in its own layout. OpenGL ES reads only a few layouts, so
 /// texels come back as integers or floats (drawn as such where the format cannot be attached to a framebuffer) and
 /// are put together on the host. Uploads of d24_unorm_s8_uint and d32_float_s8_uint keep the stencil on desktop and set it to 0
-/// in OpenGL ES, which cannot read it.
+/// in OpenGL ES, which cannot read it; depth of 24 bits, read there as a float, may be off by one step.
 
 namespace nacre::gl {
 

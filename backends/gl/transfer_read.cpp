@@ -17,9 +17,12 @@
 namespace nacre::gl {
 namespace {
 
-bool is_8bit_normalized(const rhi::FormatInfo& facts) {
-    return (facts.kind == rhi::FormatKind::unorm || facts.kind == rhi::FormatKind::srgb) &&
-           facts.block_bytes == facts.channels && !facts.is_depth_stencil();
+bool is_8bit_normalized(rhi::Format format) {
+    switch (format) {
+        case rhi::Format::r8_unorm: case rhi::Format::rg8_unorm: case rhi::Format::rgba8_unorm:
+        case rhi::Format::rgba8_srgb: return true;
+        default: return false;
+    }
 }
 
 }  // namespace
@@ -37,7 +40,7 @@ void Transfer::read_slice(GlTexture& texture, const Box& box, std::uint32_t slic
     const bool renderable =
         has_all(format_support(gl_, driver_.traits, format), rhi::FormatSupport::color_target);
     const bool floating = facts.kind == rhi::FormatKind::floating && renderable;
-    if (!renderable || (!facts.is_integer() && !floating && !is_8bit_normalized(facts)))
+    if (!renderable || (!facts.is_integer() && !floating && !is_8bit_normalized(format)))
         return read_slice_by_shader(texture, box, slice, destination);
 
     const std::uint32_t layer = texture.target == GL_TEXTURE_3D ? box.offset.z + slice : box.layer;
@@ -45,7 +48,7 @@ void Transfer::read_slice(GlTexture& texture, const Box& box, std::uint32_t slic
     const auto x = static_cast<GLint>(box.offset.x), y = static_cast<GLint>(box.offset.y);
     const auto width = static_cast<GLsizei>(box.extent.width), height = static_cast<GLsizei>(box.extent.height);
     const std::size_t count = std::size_t{box.extent.width} * box.extent.height;
-    if (is_8bit_normalized(facts)) {
+    if (is_8bit_normalized(format)) {
         std::vector<std::byte> rgba(count * 4);
         gl_.ReadPixels(x, y, width, height, GL_RGBA, GL_UNSIGNED_BYTE, rgba.data());
         for (std::size_t i = 0; i < count; ++i)
