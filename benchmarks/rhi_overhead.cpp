@@ -253,8 +253,11 @@ int run(int rounds, bool verbose) {
     std::vector<Times> native_times, rhi_times;
     constexpr int warm_up = 3;
     for (int i = 0; i < rounds + warm_up; ++i) {
-        const Times native_round = by_hand.round();
-        const Times rhi_round = through_rhi.round();
+        // Who comes first alternates too.
+        Times native_round, rhi_round;
+        if (i % 2 == 0) native_round = by_hand.round();
+        rhi_round = through_rhi.round();
+        if (i % 2 != 0) native_round = by_hand.round();
         if (i < warm_up) continue;
         native_times.push_back(native_round);
         rhi_times.push_back(rhi_round);
