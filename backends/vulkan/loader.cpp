@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
+
 namespace nacre::vulkan {
 namespace {
 
@@ -47,6 +49,10 @@ Expected<DeviceFunctions> DeviceFunctions::load(const InstanceFunctions& functio
 }
 
 Expected<std::shared_ptr<const Library>> Library::open() {
+    // Read by lavapipe when it is loaded, where the user has not set it: its default texture filter takes one level of
+    // detail for a quad of pixels and filters 8-bit textures in 8-bit arithmetic; neither conforms, and pictures would
+    // differ from other devices'.
+    ::setenv("GALLIVM_PERF", "no_quad_lod,no_aos_sampling", /*overwrite=*/0);
     auto library = std::make_shared<Library>();
     NACRE_TRY(library->file,
               DynamicLibrary::open({"libvulkan.so.1", "libvulkan.so"}, "libvulkan1", LibraryLifetime::resident));
