@@ -5,28 +5,46 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <glm/geometric.hpp>
-#include <unordered_map>
+#include <limits>
 
 namespace nacre::scene {
 namespace {
 
-template <typename Key>
-struct WordsHash {
-    std::size_t operator()(const Key& key) const {
-        std::uint64_t hash = 0xcbf29ce484222325ULL;
-        for (const auto word : key) {
-            hash = (hash ^ word) * 0x9e3779b97f4a7c15ULL;
-            hash ^= hash >> 29;
-        }
-        return static_cast<std::size_t>(hash);
-    }
-};
-
 std::uint32_t bits_of(float value) { return std::bit_cast<std::uint32_t>(value + 0.0f); }  // -0 and 0 are one value
 
 constexpr std::uint32_t none = 0xffffffffu;
+
+/// Numbers distinct keys of `words` words in the order in which they come. A table of its own with open addressing: it
+/// is the inner loop of loading large scenes.
+template <std::size_t words>
+class KeyNumbers {
+  public:
+    using Key = std::array<std::uint32_t, words>;
+
+    explicit KeyNumbers(std::size_t most_keys) : slots_(std::bit_ceil(2 * most_keys + 1), none) {}
+
+    [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(keys_.size()); }
+
+    std::uint32_t number_of(const Key& key) {
+        std::uint64_t hash = 0xcbf29ce484222325ULL;
+        for (const std::uint32_t word : key) {
+            hash = (hash ^ word) * 0x9e3779b97f4a7c15ULL;
+            hash ^= hash >> 29;
+        }
+        std::size_t slot = hash & (slots_.size() - 1);
+        while (slots_[slot] != none && keys_[slots_[slot]] != key) slot = (slot + 1) & (slots_.size() - 1);
+        if (slots_[slot] == none) {
+            slots_[slot] = size();
+            keys_.push_back(key);
+        }
+        return slots_[slot];
+    }
+
+  private:
+    std::vector<std::uint32_t> slots_;  ///< Numbers, by hash.
+    std::vector<Key> keys_;             ///< By number.
+};
 
 /// One run of the algorithm. A corner is 3 * triangle + 0..2.
 class TangentBuilder {
@@ -73,9 +91,7 @@ class TangentBuilder {
 
     /// Numbers the distinct (position, normal, uv).
     void weld() {
-        using Key = std::array<std::uint32_t, 8>;
-        std::unordered_map<Key, std::uint32_t, WordsHash<Key>> numbers;
-        numbers.reserve(primitive_.positions.size());
+        KeyNumbers<8> numbers(primitive_.positions.size());
         std::vector<std::uint32_t> number_of_vertex(primitive_.positions.size(), none);
         welded_.resize(corner_count_);
         for (std::uint32_t corner = 0; corner < corner_count_; ++corner) {
@@ -83,13 +99,12 @@ class TangentBuilder {
             if (number == none) {
                 const glm::vec3 p = position(corner), n = normal(corner);
                 const glm::vec2 t = uv(corner);
-                const Key key{bits_of(p.x), bits_of(p.y), bits_of(p.z), bits_of(n.x),
-                              bits_of(n.y), bits_of(n.z), bits_of(t.x), bits_of(t.y)};
-                number = numbers.try_emplace(key, static_cast<std::uint32_t>(numbers.size())).first->second;
+                number = numbers.number_of({bits_of(p.x), bits_of(p.y), bits_of(p.z), bits_of(n.x), bits_of(n.y),
+                                            bits_of(n.z), bits_of(t.x), bits_of(t.y)});
             }
             welded_[corner] = number;
         }
-        welded_count_ = static_cast<std::uint32_t>(numbers.size());
+        welded_count_ = numbers.size();
     }
 
     /// The direction in which u grows on each triangle, and whether its texture is mirrored.
@@ -117,24 +132,39 @@ class TangentBuilder {
         }
     }
 
-    /// Finds for each edge (from its corner to the next) the triangle on its other side.
+    /// Finds for each edge (from its corner to the next) the triangle on its other side. Where more than two
+    /// triangles meet at an edge, those that come first in the list are joined.
     void connect() {
-        using Edge = std::array<std::uint32_t, 2>;
-        std::unordered_map<Edge, std::vector<std::uint32_t>, WordsHash<Edge>> open_edges;
-        open_edges.reserve(corner_count_);
-        opposite_.assign(corner_count_, none);
+        struct Edge {
+            std::uint64_t ends;  ///< The same for both directions.
+            std::uint32_t corner;
+        };
+        std::vector<Edge> edges;
+        edges.reserve(corner_count_);
         for (std::uint32_t corner = 0; corner < corner_count_; ++corner) {
             if (triangles_[corner / 3].degenerate) continue;
-            const Edge edge{welded_[corner], welded_[next(corner)]};
-            if (const auto found = open_edges.find({edge[1], edge[0]}); found != open_edges.end() && !found->second.empty()) {
-                // Where more than two triangles meet at an edge, the earliest are joined.
-                const std::uint32_t other = found->second.front();
-                found->second.erase(found->second.begin());
-                opposite_[corner] = other;
-                opposite_[other] = corner;
-            } else {
-                open_edges[edge].push_back(corner);
+            const auto [low, high] = std::minmax({welded_[corner], welded_[next(corner)]});
+            edges.push_back({(std::uint64_t{low} << 32) | high, corner});
+        }
+        std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
+            return a.ends != b.ends ? a.ends < b.ends : a.corner < b.corner;
+        });
+
+        opposite_.assign(corner_count_, none);
+        std::vector<std::uint32_t> forward, backward;
+        for (std::size_t first = 0; first < edges.size();) {
+            std::size_t last = first;
+            forward.clear();
+            backward.clear();
+            for (; last < edges.size() && edges[last].ends == edges[first].ends; ++last) {
+                const std::uint32_t corner = edges[last].corner;
+                (welded_[corner] <= welded_[next(corner)] ? forward : backward).push_back(corner);
             }
+            for (std::size_t i = 0; i < std::min(forward.size(), backward.size()); ++i) {
+                opposite_[forward[i]] = backward[i];
+                opposite_[backward[i]] = forward[i];
+            }
+            first = last;
         }
     }
 
@@ -264,22 +294,20 @@ void add_tangents(Primitive& primitive, std::span<const glm::vec2> uv) {
     }
     const std::vector<glm::vec4> corner_tangents = TangentBuilder(primitive, uv).corner_tangents();
 
-    // Corners of one vertex with the same tangent stay one vertex; the others become new ones behind it.
-    using Key = std::array<std::uint32_t, 5>;
-    std::unordered_map<Key, std::uint32_t, WordsHash<Key>> numbers;
-    numbers.reserve(primitive.positions.size());
+    // Corners of one vertex with the same tangent stay one vertex; the others become new ones.
+    KeyNumbers<5> numbers(corner_tangents.size());
     std::vector<std::uint32_t> sources;
     std::vector<glm::vec4> tangents;
     for (std::size_t corner = 0; corner < corner_tangents.size(); ++corner) {
         const glm::vec4& tangent = corner_tangents[corner];
         std::uint32_t& index = primitive.indices[corner];
-        const Key key{index, bits_of(tangent.x), bits_of(tangent.y), bits_of(tangent.z), bits_of(tangent.w)};
-        const auto [entry, is_new] = numbers.try_emplace(key, static_cast<std::uint32_t>(sources.size()));
-        if (is_new) {
+        const std::uint32_t number =
+            numbers.number_of({index, bits_of(tangent.x), bits_of(tangent.y), bits_of(tangent.z), bits_of(tangent.w)});
+        if (number == sources.size()) {
             sources.push_back(index);
             tangents.push_back(tangent);
         }
-        index = entry->second;
+        index = number;
     }
     primitive.tangents.clear();
     gather_vertices(primitive, sources);

@@ -68,8 +68,8 @@ std::size_t morph_target_count(Document& document, std::size_t node) {
     const auto& meshes = document.list("meshes");
     const auto mesh = document.list("nodes")[node].find_index("mesh", meshes.size(), "mesh");
     if (!mesh) return 0;
-    const auto primitives = meshes[*mesh].list("primitives");
-    return primitives.empty() ? 0 : primitives.front().list("targets").size();
+    if (meshes[*mesh].count("primitives") == 0) return 0;
+    return meshes[*mesh].at("primitives")[0].count("targets");
 }
 
 Curve read_curve(Document& document, const JsonView& sampler, const std::string& element, std::size_t components,

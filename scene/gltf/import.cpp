@@ -59,6 +59,7 @@ class Importer {
     void place_mesh(const JsonView& json, const Node& node, const std::vector<Node>& nodes);
     std::vector<glm::mat4> instance_transforms(const JsonView& json, const Node& node);
     std::vector<glm::mat4> joint_worlds(std::size_t skin, const std::vector<Node>& nodes);
+    const std::vector<float>& weights_of_mesh(std::size_t mesh);
     std::uint32_t mesh_in_pose(std::size_t mesh, const Pose& pose);
     std::uint32_t default_material();
     void place_camera(const JsonView& json, const Node& node);
@@ -69,6 +70,7 @@ class Importer {
     ImageTable images_;
     std::vector<ImportedMaterial> materials_;
     std::optional<std::uint32_t> default_material_;
+    std::map<std::size_t, std::vector<float>> mesh_weights_;
     std::map<std::pair<std::size_t, std::vector<float>>, std::uint32_t> shared_meshes_;  ///< By mesh and weights.
 };
 
@@ -84,7 +86,7 @@ void Importer::place_mesh(const JsonView& json, const Node& node, const std::vec
     const auto& meshes = document_.list("meshes");
     const auto mesh = json.find_index("mesh", meshes.size(), "mesh");
     if (!mesh) return;
-    Pose pose{.weights = node.has_weights ? node.weights : meshes[*mesh].reals("weights")};
+    Pose pose{.weights = node.has_weights ? node.weights : weights_of_mesh(*mesh)};
     if (const auto skin = json.find_index("skin", document_.list("skins").size(), "skin")) {
         pose.joint_worlds = joint_worlds(*skin, nodes);
     }
@@ -104,6 +106,12 @@ void Importer::place_mesh(const JsonView& json, const Node& node, const std::vec
     if (!instance.transforms.empty() && !scene_.meshes[instance.mesh].primitives.empty()) {
         scene_.instances.push_back(std::move(instance));
     }
+}
+
+const std::vector<float>& Importer::weights_of_mesh(std::size_t mesh) {
+    const auto [entry, is_new] = mesh_weights_.try_emplace(mesh);
+    if (is_new) entry->second = document_.list("meshes")[mesh].reals("weights");
+    return entry->second;
 }
 
 std::uint32_t Importer::mesh_in_pose(std::size_t mesh_index, const Pose& pose) {
@@ -171,6 +179,7 @@ std::vector<glm::mat4> Importer::joint_worlds(std::size_t skin, const std::vecto
     const JsonView& json = document_.list("skins")[skin];
     const std::string element = label("skin", skin, json);
     std::vector<glm::mat4> result;
+    document_.charge_geometry(json.count("joints") * sizeof(glm::mat4), element);
     for (const JsonView& joint : json.list("joints")) {
         const std::uint64_t index = joint.as_whole();
         if (index >= nodes.size()) {
@@ -250,9 +259,8 @@ void Importer::place_light(const JsonView& json, const Node& node) {
     const auto reference = extensions ? extensions->find("KHR_lights_punctual") : std::nullopt;
     if (!reference) return;
     const auto extension = document_.extension("KHR_lights_punctual");
-    const std::vector<JsonView> lights = extension ? extension->list("lights") : std::vector<JsonView>{};
-    const std::size_t index = reference->index("light", lights.size(), "light");
-    const JsonView& light_json = lights[index];
+    const std::size_t index = reference->index("light", extension ? extension->count("lights") : 0, "light");
+    const JsonView light_json = extension->at("lights")[index];
     const std::string element = label("light", index, light_json);
 
     Light light{.name = printable(light_json.text("name", ""), 200)};

@@ -307,6 +307,11 @@ glm::vec4 JsonView::vector(std::string_view key, const glm::vec4& fallback) cons
     return read_vector(*this, key, fallback);
 }
 
+std::size_t JsonView::count(std::string_view key) const {
+    const auto member = find(key);
+    return member ? member->size() : 0;
+}
+
 std::vector<JsonView> JsonView::list(std::string_view key) const {
     const auto member = find(key);
     return member ? member->elements() : std::vector<JsonView>{};

@@ -63,6 +63,8 @@ class JsonView {
     [[nodiscard]] glm::vec2 vector(std::string_view key, const glm::vec2& fallback) const;
     [[nodiscard]] glm::vec3 vector(std::string_view key, const glm::vec3& fallback) const;
     [[nodiscard]] glm::vec4 vector(std::string_view key, const glm::vec4& fallback) const;
+    /// Number of elements of an array member; 0 where absent.
+    [[nodiscard]] std::size_t count(std::string_view key) const;
     /// Elements of an array member; empty where absent.
     [[nodiscard]] std::vector<JsonView> list(std::string_view key) const;
     [[nodiscard]] std::vector<float> reals(std::string_view key) const;

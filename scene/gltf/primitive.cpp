@@ -140,13 +140,14 @@ void PrimitiveReader::read_indices() {
 
 void PrimitiveReader::apply_morph_targets() {
     if (vertex_count_ == 0) return;
-    const std::vector<JsonView> targets = json_.list("targets");
-    for (std::size_t index = 0; index < targets.size() && index < pose_.weights.size(); ++index) {
+    const std::size_t target_count = json_.count("targets");
+    for (std::size_t index = 0; index < target_count && index < pose_.weights.size(); ++index) {
         const float weight = pose_.weights[index];
         if (weight == 0.0f) continue;
+        const JsonView target = json_.at("targets")[index];
         const std::string outer = fmt::format("{}, morph target {}", element_, index);
         const auto add = [&](std::string_view name, auto& values, auto&& read_deltas) {
-            const auto accessor = attribute(targets[index], name);
+            const auto accessor = attribute(target, name);
             if (!accessor || values.empty()) return;
             const auto deltas = read_deltas(*accessor);
             for (std::size_t i = 0; i < values.size(); ++i) values[i] += weight * deltas[i];

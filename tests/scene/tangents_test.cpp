@@ -179,6 +179,26 @@ TEST(Tangents, GarbageGivesUnitVectors) {
     expect_orthonormal(without_uv);
 }
 
+TEST(Tangents, AVertexInAHundredThousandGroupsTakesNoLongerThanOthers) {
+    // Triangles that share one vertex and no edge, each with its own u direction. A search among all the tangents of a
+    // vertex would take minutes.
+    Primitive p;
+    p.positions = {{0, 0, 0}};
+    p.normals = {{0, 0, 1}};
+    p.uv0 = {{0, 0}};
+    for (std::uint32_t i = 0; i < 100'000; ++i) {
+        const float angle = 6.2831853f * static_cast<float>(i) / 100'000.0f;
+        for (const float offset : {0.0f, 2e-5f}) {
+            p.positions.emplace_back(std::cos(angle + offset), std::sin(angle + offset), 0.0f);
+            p.normals.emplace_back(0.0f, 0.0f, 1.0f);
+        }
+        p.uv0.insert(p.uv0.end(), {{1.0f, static_cast<float>(i)}, {1.0f, static_cast<float>(i) - 1e-2f}});
+        p.indices.insert(p.indices.end(), {0, 2 * i + 1, 2 * i + 2});
+    }
+    add_tangents(p, p.uv0);
+    EXPECT_GT(p.positions.size(), 250'000u) << "vertex 0 was split";
+}
+
 TEST(FlatNormals, GiveEachTriangleItsOwnVertices) {
     Primitive p = box({1, 2, 3});
     const Primitive reference = p;
