@@ -162,7 +162,7 @@ TextureData texture_data_of(passes::IntermediateContent content) {
     TextureData result{.name = description.name, .format = description.format, .width = content.width,
                        .height = content.height, .bytes = std::move(content.bytes)};
     // Depth is handed out as floats, whatever the device stores.
-    if (rhi::info(description.format).has_depth) result.format = rhi::Format::r32_float;
+    if (rhi::info(description.format).has_depth) result.format = rhi::Format::d32_float;
     for (const passes::Field& field : description.fields) {
         result.fields.push_back({std::string(field.name), 0, field.shift, field.bits, kind_of(field.kind)});
     }

@@ -28,6 +28,7 @@ Attempt<measure::SceneComparison> run_comparison(const SceneSession& scene, cons
     Progress progress(fmt::format("comparing {} on {}", scene.arguments().scene, fmt::join(backends, ", ")));
     NACRE_TRY(measure::SceneComparison comparison,
               measure::compare_backends(scene.arguments().scene, contestants, options));
+    for (const RenderSession& session : sessions) NACRE_CHECK(check_messages(session));
     return comparison;
 }
 

@@ -124,6 +124,7 @@ Outcome run(const RenderArguments& arguments) {
                            json_of(session, arguments, times, luminance, warnings)
                                    .dump(2, ' ', false, Json::error_handler_t::replace) +
                                "\n"));
+    NACRE_CHECK(check_messages(session));
     return ExitCode::success;
 }
 

@@ -123,6 +123,14 @@ Attempt<void> check_dump_name(const passes::Renderer& renderer, const std::strin
                         fmt::format("Use one of: {}.", fmt::join(names, ", "))});
 }
 
+Expected<void> check_messages(const RenderSession& session) {
+    const std::uint64_t count = session.device->error_message_count();
+    if (count == 0) return {};
+    return fail(ErrorCode::validation, "render on", fmt::format("'{}'", session.backend),
+                fmt::format("validation reported {} error{}", count, count == 1 ? "" : "s"),
+                "The messages are above; this is a fault of Nacre or of the driver, please report it.");
+}
+
 Expected<void> write_graph(const passes::Renderer& renderer, const std::string& path) {
     if (path.empty()) return {};
     return write_file_atomically(path, path.ends_with(".svg") ? renderer.graph_as_svg() : renderer.graph_as_dot());

@@ -56,6 +56,9 @@ class SceneSession {
 /// Fails, naming the textures that there are, where `name` is none of `renderer`'s.
 Attempt<void> check_dump_name(const passes::Renderer& renderer, const std::string& name);
 
+/// Fails where validation (Nacre's own or the driver's, see --driver-validation) reported errors on this device.
+Expected<void> check_messages(const RenderSession& session);
+
 /// Writes the graph of passes where `--dump-graph` asked for it.
 Expected<void> write_graph(const passes::Renderer& renderer, const std::string& path);
 
