@@ -146,6 +146,13 @@ Expected<std::unique_ptr<Device>> Instance::create_device(const DeviceDesc& desc
         NACRE_TRY(state->backend, backend.create_device(backend_desc));
         state->adapter = state->backend->adapter();
         state->shared->capabilities = state->backend->capabilities();
+        // Some drivers have textures of three 32-bit channels; this interface has them as vertex attributes alone, and what
+        // the capabilities say must be what `create_texture` takes.
+        for (std::uint32_t i = 0; i < format_count; ++i) {
+            FormatSupport& support = state->shared->capabilities.formats[i];
+            if (info(static_cast<Format>(i)).block_bytes == 12)
+                support = has_all(support, FormatSupport::vertex) ? FormatSupport::vertex : FormatSupport::none;
+        }
         NACRE_TRY(state->shared->capabilities, restrict_capabilities(state->shared->capabilities, desc.restriction));
         return std::unique_ptr<Device>(new Device(std::move(state)));
     };
