@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
-#include <iostream>
 #include <set>
 
 #include "scene/environment.h"
@@ -39,10 +38,6 @@ TEST_F(Assets, EverySceneLoadsAndIsValid) {
         expect_valid_scene(*scene);
         EXPECT_FALSE(scene->instances.empty());
         EXPECT_GT(world_bounds(*scene).radius(), 0.0f);
-        std::cout << file.stem().string() << ": " << scene->meshes.size() << " meshes, " << scene->instances.size()
-                  << " instances, " << triangle_count(*scene) << " triangles, " << scene->images.size() << " images, "
-                  << scene->materials.size() << " materials, radius " << world_bounds(*scene).radius() << "\n";
-        for (const std::string& warning : scene->warnings) std::cout << "    " << warning << "\n";
         ++count;
     }
     EXPECT_GE(count, 20);

@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "scene/environment.h"
 #include "scene/load.h"
 #include "tests/scene/scene_checks.h"
 
@@ -88,35 +87,6 @@ TEST(Builtin, TheAlphaSceneHasBothAlphaModesAndATexture) {
     EXPECT_GE(blended, 3);
     ASSERT_FALSE(scene->images.empty());
     EXPECT_TRUE(scene->images[0].has_alpha);
-}
-
-TEST(Environment, DirectionsAndCoordinatesAreInverse) {
-    EXPECT_NEAR(environment_direction({0.5f, 0.5f}).z, -1.0f, 1e-6f);
-    EXPECT_NEAR(environment_direction({0.75f, 0.5f}).x, 1.0f, 1e-6f);
-    EXPECT_NEAR(environment_direction({0.5f, 0.0f}).y, 1.0f, 1e-6f);
-    for (float u = 0.05f; u < 1.0f; u += 0.1f) {
-        for (float v = 0.05f; v < 1.0f; v += 0.1f) {
-            const glm::vec2 back = environment_uv(3.0f * environment_direction({u, v}));
-            EXPECT_NEAR(back.x, u, 1e-5f);
-            EXPECT_NEAR(back.y, v, 1e-5f);
-        }
-    }
-}
-
-TEST(Environment, TheStudioHasItsDocumentedBrightness) {
-    const Environment studio = studio_environment();
-    double sum = 0.0, weights = 0.0;
-    for (std::uint32_t row = 0; row < studio.height; ++row) {
-        const double weight = std::sin((row + 0.5) / studio.height * 3.14159265358979);
-        for (std::uint32_t column = 0; column < studio.width; ++column) {
-            const glm::vec4& texel = studio.texels[std::size_t{row} * studio.width + column];
-            ASSERT_TRUE(is_finite(glm::vec3(texel)));
-            ASSERT_GT(std::min({texel.r, texel.g, texel.b}), 0.0f);
-            sum += weight * (0.2126 * texel.r + 0.7152 * texel.g + 0.0722 * texel.b);
-            weights += weight;
-        }
-    }
-    EXPECT_NEAR(sum / weights, 0.5, 1e-3);
 }
 
 TEST(Camera, FramingSeesEveryCornerAndIsNotFarAway) {
