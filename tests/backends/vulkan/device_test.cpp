@@ -321,7 +321,8 @@ TEST_P(DeviceTest, KeepsGroupsAndConstantsAcrossPipelines) {
     const ComputePipeline two = must(gpu().create_compute_pipeline({.shader = make_shader("two.comp", head + R"(
         layout(set = 1, binding = 0) uniform Factor { uint factor; };
         void main() { values[at] = (values[at] + value) * factor; })")}));
-    const Buffer values = must(gpu().create_buffer({.size = 64, .usage = BufferUsage::storage, .name = "values"}));
+    const Buffer values = must(gpu().create_buffer(
+        {.size = 64, .usage = BufferUsage::storage | BufferUsage::copy_destination, .name = "values"}));
     const Buffer factor = must(gpu().create_buffer({.size = 256, .usage = BufferUsage::uniform, .name = "factor"}));
     const std::uint32_t five[64] = {5};
     must(gpu().write_buffer(factor, std::as_bytes(std::span(five))));
