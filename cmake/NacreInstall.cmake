@@ -16,15 +16,21 @@ install(FILES "${CMAKE_BINARY_DIR}/nacreConfig.cmake" "${CMAKE_BINARY_DIR}/nacre
   DESTINATION "${package_dir}")
 install(EXPORT nacre-targets NAMESPACE nacre:: DESTINATION "${package_dir}")
 
-# Headers that are no part of the interface: what a folder below a part holds, and these.
-set(internal_headers
-  core/image_formats.h rhi/device_access.h rhi/device_state.h rhi/embedded_shaders.h rhi/glslang_version.h
-  rhi/object_checks.h rhi/objects.h rhi/pipeline_checks.h rhi/shader_compiler_glslang.h rhi/slot_table.h rhi/spirv.h
-  rhi/state_tracker.h rhi/texture_pages.h rhi/validation_rules.h)
-foreach(part core rhi materials scene passes measure)
-  file(GLOB headers RELATIVE "${CMAKE_SOURCE_DIR}" CONFIGURE_DEPENDS "${part}/*.h")
-  list(REMOVE_ITEM headers ${internal_headers})
-  install(FILES ${headers} DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/nacre/${part}")
+# The interface: what users of a part include. The rest of its headers is how it works inside.
+set(public_headers
+  core/disk_cache.h core/dynamic_library.h core/embedded_file.h core/error.h core/file.h core/hash.h core/image.h
+  core/log.h core/progress.h core/srgb.h
+  rhi/backend.h rhi/capabilities.h rhi/command_list.h rhi/command_stream.h rhi/device.h rhi/format.h rhi/handle.h
+  rhi/pipeline.h rhi/pipeline_reloader.h rhi/reflection.h rhi/resources.h rhi/shader_compiler.h rhi/texture_table.h
+  rhi/validation.h
+  materials/description.h materials/single_slab.h
+  scene/builtin.h scene/environment.h scene/load.h scene/scene.h scene/shapes.h scene/tangents.h
+  passes/frame_graph.h passes/gbuffer_layout.h passes/plan.h passes/profiles.h passes/renderer.h
+  measure/comparison_page.h measure/cross_backend.h measure/flip.h measure/frame_times.h measure/image_metrics.h
+  measure/report_page.h measure/texel_decoding.h measure/texture_comparison.h measure/tolerance.h)
+foreach(header IN LISTS public_headers)
+  get_filename_component(folder "${header}" DIRECTORY)
+  install(FILES "${CMAKE_SOURCE_DIR}/${header}" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/nacre/${folder}")
 endforeach()
 # Of a backend a program needs only the header that declares it.
 foreach(backend vulkan gl)
