@@ -112,9 +112,11 @@ void GeometryDraws::record_item(rhi::CommandList& list, const Item& item, rhi::B
     geometry_->record(list, draw, item.attributes);
 }
 
-void GeometryDraws::record(rhi::CommandList& list, rhi::BindGroup frame_group) const {
+void GeometryDraws::record(rhi::CommandList& list, rhi::BindGroup frame_group, const std::vector<bool>& visible) const {
     std::uint32_t pipeline = ~0u, material = ~0u;
-    for (const Item& item : items_) record_item(list, item, frame_group, item.pipeline, pipeline, material);
+    for (const Item& item : items_) {
+        if (visible[item.draw]) record_item(list, item, frame_group, item.pipeline, pipeline, material);
+    }
 }
 
 void GeometryDraws::record_one(rhi::CommandList& list, rhi::BindGroup frame_group, std::uint32_t draw,

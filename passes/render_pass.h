@@ -67,6 +67,7 @@ struct RenderContext {
     rhi::Sampler nearest{};                  ///< For texelFetch, where a sampler must be bound.
     rhi::Sampler linear{};                   ///< Clamps to the edge, with mips.
     bool write_tile_classes = false;
+    std::vector<bool> visible{};             ///< Draws that the camera may see; made anew for each frame.
 };
 
 class RenderPass {
@@ -108,8 +109,8 @@ class GeometryDraws {
     /// `draws`: indices into the geometry's draws; their order is kept when `keep_order`.
     Expected<void> prepare(RenderContext& context, const GeometryPassDesc& desc, std::vector<std::uint32_t> draws,
                            bool keep_order = false);
-    /// Records all draws, or those at the given positions. The group for set 0 is bound for each pipeline.
-    void record(rhi::CommandList& list, rhi::BindGroup frame_group) const;
+    /// Records the draws that are visible (by index of the geometry's draws). The group is that of set 0.
+    void record(rhi::CommandList& list, rhi::BindGroup frame_group, const std::vector<bool>& visible) const;
     void record_one(rhi::CommandList& list, rhi::BindGroup frame_group, std::uint32_t draw, bool back_faces) const;
     [[nodiscard]] std::uint64_t size() const { return items_.size(); }
 
@@ -165,7 +166,8 @@ struct ComputeStep {
 };
 
 // One function for each pass folder, in the order of the frame. Each declares its passes in the graph.
-std::unique_ptr<RenderPass> make_shadow_maps(RenderContext& context, std::span<const rhi::BindGroup> view_groups);
+std::unique_ptr<RenderPass> make_shadow_maps(RenderContext& context, std::span<const rhi::BindGroup> view_groups,
+                                             std::span<const glm::mat4> view_matrices);
 std::unique_ptr<RenderPass> make_depth_prepass(RenderContext& context);
 std::unique_ptr<RenderPass> make_alpha_test_prepass(RenderContext& context);
 std::unique_ptr<RenderPass> make_stencil_prepass(RenderContext& context);

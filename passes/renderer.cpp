@@ -406,7 +406,7 @@ Expected<void> Renderer::State::make_passes() {
     resources.tiles = graph.add_buffer({.size = std::uint64_t{4} * 4 * tiles_x * tiles_y, .name = "tiles"});
 
     // The group of set 0 needs the shadow maps, which the graph makes; passes take it from the context in `prepare`.
-    if (decisions.shadow_view_count > 0) passes.push_back(make_shadow_maps(*context, shadow_groups));
+    if (decisions.shadow_view_count > 0) passes.push_back(make_shadow_maps(*context, shadow_groups, light_setup.shadow_views));
     passes.push_back(make_depth_prepass(*context));
     if (decisions.alpha_test) passes.push_back(make_alpha_test_prepass(*context));
     if (decisions.emission) passes.push_back(make_stencil_prepass(*context));
@@ -540,6 +540,7 @@ Expected<FrameStatistics> Renderer::render_frame() {
     const auto start = std::chrono::steady_clock::now();
     const CameraBlock camera = camera_block(state.view, state.options.width, state.options.height);
     NACRE_CHECK(state.device.write_buffer(state.camera, std::as_bytes(std::span(&camera, 1))));
+    state.context->visible = state.geometry->visible_in(camera.view_projection);
     for (const std::unique_ptr<RenderPass>& pass : state.passes) pass->update(glm::vec3(camera.position));
     rhi::CommandList list = state.device.create_command_list("frame");
     state.graph.record(list, state.timestamps);

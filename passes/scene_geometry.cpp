@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "passes/scene_geometry.h"
 
+#include <cmath>
 #include <cstring>
 #include <fmt/format.h>
 #include <glm/mat4x4.hpp>
@@ -137,6 +138,28 @@ void SceneGeometry::record(rhi::CommandList& list, const Draw& draw, std::uint32
     list.set_vertex_buffer(slot, instances_, draw.instance_offset);
     list.set_index_buffer(indices_, rhi::IndexType::uint32, draw.index_offset);
     list.draw_indexed({.index_count = draw.index_count, .instance_count = draw.instance_count});
+}
+
+std::vector<bool> SceneGeometry::visible_in(const glm::mat4& view_projection) const {
+    std::vector<bool> visible;
+    visible.reserve(draws_.size());
+    for (const Draw& draw : draws_) {
+        // Outside when all corners are on the wrong side of one plane: -w <= x, y <= w, 0 <= z <= w.
+        bool beyond[6] = {true, true, true, true, true, true};
+        for (int corner = 0; corner < 8; ++corner) {
+            const glm::vec3 point((corner & 1) != 0 ? draw.bounds.maximum.x : draw.bounds.minimum.x,
+                                  (corner & 2) != 0 ? draw.bounds.maximum.y : draw.bounds.minimum.y,
+                                  (corner & 4) != 0 ? draw.bounds.maximum.z : draw.bounds.minimum.z);
+            const glm::vec4 clip = view_projection * glm::vec4(point, 1.0f);
+            // A little room for rounding: what the device draws must never be left out.
+            const float w = clip.w + 1e-4f * std::abs(clip.w);
+            beyond[0] &= clip.x < -w, beyond[1] &= clip.x > w;
+            beyond[2] &= clip.y < -w, beyond[3] &= clip.y > w;
+            beyond[4] &= clip.z < -1e-4f * std::abs(clip.w), beyond[5] &= clip.z > w;
+        }
+        visible.push_back(!(beyond[0] || beyond[1] || beyond[2] || beyond[3] || beyond[4] || beyond[5]));
+    }
+    return visible;
 }
 
 void SceneGeometry::describe_vertices(std::uint32_t attributes, rhi::GraphicsPipelineDesc& pipeline) {

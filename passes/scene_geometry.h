@@ -60,6 +60,9 @@ class SceneGeometry {
     /// Binds the given attributes (attribute_bit) and the instances in ascending order of slots, and draws.
     void record(rhi::CommandList& list, const Draw& draw, std::uint32_t attributes) const;
 
+    /// For each draw whether any of it can be inside the view. Bounds are tested, so that some that are not may count.
+    [[nodiscard]] std::vector<bool> visible_in(const glm::mat4& view_projection) const;
+
     /// The vertex layout that `record` expects, written into a pipeline description.
     static void describe_vertices(std::uint32_t attributes, rhi::GraphicsPipelineDesc& pipeline);
 

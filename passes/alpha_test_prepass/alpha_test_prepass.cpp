@@ -15,7 +15,7 @@ namespace {
 
 class AlphaTestPrepass final : public RenderPass {
   public:
-    explicit AlphaTestPrepass(RenderContext& context) : depth_(context.resources.depth) {
+    explicit AlphaTestPrepass(RenderContext& context) : depth_(context.resources.depth), visible_(context.visible) {
         name = "alpha test prepass";
         desc_ = {.name = name,
                  .vertex_shader = "passes/alpha_test_prepass/alpha_test_prepass.vert",
@@ -33,7 +33,7 @@ class AlphaTestPrepass final : public RenderPass {
         uses_geometry(pass, context, desc_, selected_);
         pass.records([this](PassContext& frame) {
             frame.list.begin_render_pass({.depth_stencil = {.view = frame.texture(depth_)}, .name = name});
-            draws_.record(frame.list, group_);
+            draws_.record(frame.list, group_, visible_);
             frame.list.end_render_pass();
         });
     }
@@ -46,6 +46,7 @@ class AlphaTestPrepass final : public RenderPass {
     GeometryPassDesc desc_;
     std::vector<std::uint32_t> selected_;
     rhi::BindGroup group_;
+    const std::vector<bool>& visible_;
     GeometryDraws draws_;
 };
 

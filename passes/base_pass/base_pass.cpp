@@ -13,7 +13,7 @@ namespace {
 
 class BasePass final : public RenderPass {
   public:
-    explicit BasePass(RenderContext& context) : resources_(context.resources) {
+    explicit BasePass(RenderContext& context) : resources_(context.resources), visible_(context.visible) {
         name = "base pass";
         desc_ = {.name = name,
                  .vertex_shader = "passes/base_pass/base_pass.vert",
@@ -49,7 +49,7 @@ class BasePass final : public RenderPass {
                 target.color.push_back(attachment);
             }
             frame.list.begin_render_pass(target);
-            draws_.record(frame.list, group_);
+            draws_.record(frame.list, group_, visible_);
             frame.list.end_render_pass();
         });
     }
@@ -62,6 +62,7 @@ class BasePass final : public RenderPass {
     GeometryPassDesc desc_;
     std::vector<std::uint32_t> selected_;
     rhi::BindGroup group_;
+    const std::vector<bool>& visible_;
     GeometryDraws draws_;
 };
 

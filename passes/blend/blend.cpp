@@ -20,7 +20,7 @@ namespace {
 class Blend final : public RenderPass {
   public:
     explicit Blend(RenderContext& context)
-        : geometry_(context.geometry), device_(context.device), packed_(context.decisions.packed_targets) {
+        : geometry_(context.geometry), visible_(context.visible), device_(context.device), packed_(context.decisions.packed_targets) {
         name = "blend";
         sorted_ = select_draws(context.geometry, [](const Draw& draw) {
             return draw.alpha_mode == materials::AlphaMode::blend;
@@ -103,6 +103,7 @@ class Blend final : public RenderPass {
 
     void draw_range(rhi::CommandList& list, std::size_t first, std::size_t last) const {
         for (std::size_t i = first; i < last; ++i) {
+            if (!visible_[sorted_[i]]) continue;
             draws_.record_one(list, group_, sorted_[i], true);
             draws_.record_one(list, group_, sorted_[i], false);
         }
@@ -158,6 +159,7 @@ class Blend final : public RenderPass {
     }
 
     const SceneGeometry& geometry_;
+    const std::vector<bool>& visible_;
     rhi::Device& device_;
     bool packed_;
     rhi::BindGroup group_;

@@ -21,7 +21,7 @@ namespace {
 
 class DepthPrepass final : public RenderPass {
   public:
-    explicit DepthPrepass(RenderContext& context) : depth_(context.resources.depth) {
+    explicit DepthPrepass(RenderContext& context) : depth_(context.resources.depth), visible_(context.visible) {
         name = "depth prepass";
         desc_ = {.name = name,
                  .vertex_shader = "passes/depth_prepass/depth_prepass.vert",
@@ -41,7 +41,7 @@ class DepthPrepass final : public RenderPass {
                                                             .clear_depth = 0.0f,
                                                             .stencil_load = rhi::LoadOperation::clear},
                                           .name = name});
-            draws_.record(frame.list, group_);
+            draws_.record(frame.list, group_, visible_);
             frame.list.end_render_pass();
         });
     }
@@ -54,6 +54,7 @@ class DepthPrepass final : public RenderPass {
     GeometryPassDesc desc_;
     std::vector<std::uint32_t> selected_;
     rhi::BindGroup group_;
+    const std::vector<bool>& visible_;
     GeometryDraws draws_;
 };
 

@@ -15,7 +15,7 @@ namespace {
 class Emission final : public RenderPass {
   public:
     explicit Emission(RenderContext& context)
-        : resources_(context.resources), packed_(context.decisions.packed_targets) {
+        : resources_(context.resources), packed_(context.decisions.packed_targets), visible_(context.visible) {
         name = "emission";
         rhi::DepthStencilState state{.format = context.decisions.depth_format,
                                      .depth_test = true,
@@ -56,7 +56,7 @@ class Emission final : public RenderPass {
             frame.list.begin_render_pass(
                 {.color = {attachment}, .depth_stencil = {.view = frame.texture(resources_.depth)}, .name = name});
             frame.list.set_stencil_reference(1);
-            draws_.record(frame.list, group_);
+            draws_.record(frame.list, group_, visible_);
             frame.list.end_render_pass();
         });
     }
@@ -70,6 +70,7 @@ class Emission final : public RenderPass {
     GeometryPassDesc desc_;
     std::vector<std::uint32_t> selected_;
     rhi::BindGroup group_;
+    const std::vector<bool>& visible_;
     GeometryDraws draws_;
 };
 

@@ -16,8 +16,10 @@ namespace {
 
 class ShadowMaps final : public RenderPass {
   public:
-    ShadowMaps(RenderContext& context, std::span<const rhi::BindGroup> views)
+    ShadowMaps(RenderContext& context, std::span<const rhi::BindGroup> views, std::span<const glm::mat4> matrices)
         : shadow_maps_(context.resources.shadow_maps), views_(views.begin(), views.end()) {
+        // Neither lights nor geometry move: what a view sees is known.
+        for (const glm::mat4& matrix : matrices) visible_.push_back(context.geometry.visible_in(matrix));
         name = "shadow maps";
         const rhi::DepthStencilState state{.format = rhi::Format::d32_float,
                                            .depth_test = true,
@@ -52,8 +54,8 @@ class ShadowMaps final : public RenderPass {
                                        .depth_load = rhi::LoadOperation::clear,
                                        .clear_depth = 0.0f},
                      .name = name});
-                opaque_draws_.record(frame.list, views_[view]);
-                masked_draws_.record(frame.list, views_[view]);
+                opaque_draws_.record(frame.list, views_[view], visible_[view]);
+                masked_draws_.record(frame.list, views_[view], visible_[view]);
                 frame.list.end_render_pass();
             }
         });
@@ -70,6 +72,7 @@ class ShadowMaps final : public RenderPass {
   private:
     TextureId shadow_maps_;
     std::vector<rhi::BindGroup> views_;
+    std::vector<std::vector<bool>> visible_;
     GeometryPassDesc opaque_desc_, masked_desc_;
     std::vector<std::uint32_t> opaque_, masked_;
     GeometryDraws opaque_draws_, masked_draws_;
@@ -77,8 +80,9 @@ class ShadowMaps final : public RenderPass {
 
 }  // namespace
 
-std::unique_ptr<RenderPass> make_shadow_maps(RenderContext& context, std::span<const rhi::BindGroup> view_groups) {
-    return std::make_unique<ShadowMaps>(context, view_groups);
+std::unique_ptr<RenderPass> make_shadow_maps(RenderContext& context, std::span<const rhi::BindGroup> view_groups,
+                                             std::span<const glm::mat4> view_matrices) {
+    return std::make_unique<ShadowMaps>(context, view_groups, view_matrices);
 }
 
 }  // namespace nacre::passes

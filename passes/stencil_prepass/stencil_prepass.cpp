@@ -14,7 +14,7 @@ namespace {
 
 class StencilPrepass final : public RenderPass {
   public:
-    explicit StencilPrepass(RenderContext& context) : depth_(context.resources.depth) {
+    explicit StencilPrepass(RenderContext& context) : depth_(context.resources.depth), visible_(context.visible) {
         name = "stencil prepass";
         rhi::DepthStencilState state{.format = context.decisions.depth_format,
                                      .depth_test = true,
@@ -35,7 +35,7 @@ class StencilPrepass final : public RenderPass {
         pass.records([this](PassContext& frame) {
             frame.list.begin_render_pass({.depth_stencil = {.view = frame.texture(depth_)}, .name = name});
             frame.list.set_stencil_reference(1);
-            draws_.record(frame.list, group_);
+            draws_.record(frame.list, group_, visible_);
             frame.list.end_render_pass();
         });
     }
@@ -48,6 +48,7 @@ class StencilPrepass final : public RenderPass {
     GeometryPassDesc desc_;
     std::vector<std::uint32_t> selected_;
     rhi::BindGroup group_;
+    const std::vector<bool>& visible_;
     GeometryDraws draws_;
 };
 
