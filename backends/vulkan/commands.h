@@ -94,7 +94,8 @@ class Commands {
     std::vector<std::pair<QueryPool*, std::uint32_t>> resets_;
     bool occlusion_is_open_ = false;
 
-    /// Debug groups that are open: a label may not reach from one command buffer into the next, so each part opens its own.
+    /// Debug groups that are open: a label may not reach from one command buffer into the next, so each part opens its
+    /// own.
     std::vector<const char*> open_groups_;
 
     bool in_pass_ = false, pass_has_label_ = false;

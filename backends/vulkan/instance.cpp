@@ -66,7 +66,7 @@ Expected<std::shared_ptr<const Instance>> Instance::create(std::shared_ptr<const
     std::shared_ptr<Instance> instance(new Instance);
     instance->library_ = library;
     instance->options_ = std::move(options);
-    instance->version_ = std::min<std::uint32_t>(library->version, VK_API_VERSION_1_3);
+    instance->version_ = std::min(library->version, instance->options_.highest_version);
     instance->has_debug_utils_ = has_extension(global, nullptr, VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
     if (instance->has_debug_utils_) extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
 

@@ -13,6 +13,8 @@ namespace nacre::vulkan {
 struct InstanceOptions {
     bool validation = false;  ///< Khronos validation layer: core and synchronization validation.
     std::function<void(const rhi::Message&)> report{};  ///< For the layer's messages; any thread.
+    /// Newest version to use, so that a new driver stands in for an old one.
+    std::uint32_t highest_version = VK_API_VERSION_1_3;
 };
 
 /// Owns a VkInstance and the messenger of its validation layer. Layers are chosen for a whole instance, so devices
@@ -27,7 +29,7 @@ class Instance {
     Instance& operator=(const Instance&) = delete;
 
     [[nodiscard]] VkInstance handle() const { return handle_; }
-    /// The version asked for: that of the library, at most 1.3.
+    /// The version asked for: that of the library, at most the highest of the options.
     [[nodiscard]] std::uint32_t version() const { return version_; }
     [[nodiscard]] bool has_debug_utils() const { return has_debug_utils_; }
     [[nodiscard]] Expected<std::vector<VkPhysicalDevice>> physical_devices() const;

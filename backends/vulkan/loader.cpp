@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <cstdlib>
+#include "backends/vulkan/quirks.h"
 
 namespace nacre::vulkan {
 namespace {
@@ -49,10 +49,7 @@ Expected<DeviceFunctions> DeviceFunctions::load(const InstanceFunctions& functio
 }
 
 Expected<std::shared_ptr<const Library>> Library::open() {
-    // Read by lavapipe when it is loaded, where the user has not set it: its default texture filter takes one level of
-    // detail for a quad of pixels and filters 8-bit textures in 8-bit arithmetic; neither conforms, and pictures would
-    // differ from other devices'.
-    ::setenv("GALLIVM_PERF", "no_quad_lod,no_aos_sampling", /*overwrite=*/0);
+    prepare_for_drivers();
     auto library = std::make_shared<Library>();
     NACRE_TRY(library->file,
               DynamicLibrary::open({"libvulkan.so.1", "libvulkan.so"}, "libvulkan1", LibraryLifetime::resident));

@@ -55,7 +55,7 @@ Expected<std::vector<std::unique_ptr<PhysicalDevice>>> PhysicalDevice::list(cons
     std::vector<std::unique_ptr<PhysicalDevice>> devices;
     std::string refused;
     for (VkPhysicalDevice handle : handles) {
-        std::unique_ptr<PhysicalDevice> device(new PhysicalDevice);
+        auto device = std::make_unique<PhysicalDevice>();
         device->handle = handle;
         instance.vk.GetPhysicalDeviceProperties(handle, &device->properties);
         device->version_ = std::min(device->properties.apiVersion, instance.version());

@@ -32,6 +32,9 @@ struct FeatureChain {
 /// One device of an instance: what it says about itself, before anything is enabled.
 class PhysicalDevice {
   public:
+    /// Nothing known yet; tests fill in what they need.
+    PhysicalDevice() = default;
+
     /// All devices of Vulkan 1.2 or later with a queue for graphics and compute, the fastest kind first (discrete,
     /// integrated, virtual, software). Errors: not_found where there is none.
     static Expected<std::vector<std::unique_ptr<PhysicalDevice>>> list(const Instance& instance);
@@ -55,8 +58,6 @@ class PhysicalDevice {
     bool has_robustness2 = false;
 
   private:
-    PhysicalDevice() = default;
-
     std::vector<VkExtensionProperties> extensions_;
     std::uint32_t version_ = 0;
 };
