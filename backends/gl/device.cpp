@@ -108,14 +108,16 @@ GlDevice::~GlDevice() {
 
 Expected<void> GlDevice::check_lost(const char* attempted) const {
     if (!driver_->lost) return {};
-    return fail(ErrorCode::device_lost, attempted, adapter_.name, "the device was lost",
+    const std::scoped_lock lock(mutex_);
+    return fail(ErrorCode::device_lost, attempted, adapter_.name, fmt::format("the device was lost: {}", lost_reason_),
                 "Destroy the device and make a new one.");
 }
 
 void GlDevice::lose(const std::string& reason) {
-    if (driver_->lost.exchange(true)) return;
-    log_message(LogLevel::error, fmt::format("device '{}' is lost: {}", adapter_.name, reason));
     const std::scoped_lock lock(mutex_);
+    if (driver_->lost) return;
+    lost_reason_ = reason;
+    driver_->lost = true;
     changed_.notify_all();
 }
 

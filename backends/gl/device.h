@@ -77,9 +77,10 @@ class GlDevice : public rhi::BackendDevice {
     rhi::Capabilities capabilities_;
     std::unique_ptr<Executor> executor_;   // Worker thread only.
     std::deque<PendingFence> fences_;      // Worker thread only.
-    std::mutex mutex_;
+    mutable std::mutex mutex_;
     std::condition_variable changed_;
     std::uint64_t completed_ = 0;          // Under mutex_.
+    std::string lost_reason_;              // Under mutex_.
     std::uint64_t submissions_ = 0;
 };
 

@@ -97,20 +97,16 @@ bool is_16bit_float(Format format) {
     return format == Format::r16_float || format == Format::rg16_float || format == Format::rgba16_float;
 }
 
-// Formats of storage images: OpenGL ES 3.1, table 8.27; OpenGL 4.5, table 8.26.
-bool is_image_format(Format format, bool es) {
+// OpenGL 4.5, table 8.26, without those of OpenGL ES.
+bool is_desktop_image_format(Format format) {
     switch (format) {
-        case Format::rgba32_float: case Format::rgba16_float: case Format::r32_float: case Format::rgba32_uint:
-        case Format::rgba16_uint: case Format::rgba8_uint: case Format::r32_uint: case Format::rgba32_sint:
-        case Format::rgba16_sint: case Format::rgba8_sint: case Format::r32_sint: case Format::rgba8_unorm:
-        case Format::rgba8_snorm: return true;
         case Format::rg32_float: case Format::rg16_float: case Format::rg11b10_float: case Format::r16_float:
         case Format::rgba16_unorm: case Format::rgb10a2_unorm: case Format::rg16_unorm: case Format::rg8_unorm:
         case Format::r16_unorm: case Format::r8_unorm: case Format::rgba16_snorm: case Format::rg16_snorm:
         case Format::rg8_snorm: case Format::r16_snorm: case Format::r8_snorm: case Format::rgb10a2_uint:
         case Format::rg32_uint: case Format::rg16_uint: case Format::rg8_uint: case Format::r16_uint:
         case Format::r8_uint: case Format::rg32_sint: case Format::rg16_sint: case Format::rg8_sint:
-        case Format::r16_sint: case Format::r8_sint: return !es;
+        case Format::r16_sint: case Format::r8_sint: return true;
         default: return false;
     }
 }
@@ -142,6 +138,16 @@ bool is_color_renderable(const Traits& traits, Format format) {
 
 }  // namespace
 
+bool is_es_image_format(Format format) {
+    switch (format) {
+        case Format::rgba32_float: case Format::rgba16_float: case Format::r32_float: case Format::rgba32_uint:
+        case Format::rgba16_uint: case Format::rgba8_uint: case Format::r32_uint: case Format::rgba32_sint:
+        case Format::rgba16_sint: case Format::rgba8_sint: case Format::r32_sint: case Format::rgba8_unorm:
+        case Format::rgba8_snorm: return true;
+        default: return false;
+    }
+}
+
 const GlFormat& gl_format(Format format) { return table[static_cast<std::uint32_t>(format)]; }
 
 FormatSupport format_support(const Functions& gl, const Traits& traits, Format format) {
@@ -158,9 +164,10 @@ FormatSupport format_support(const Functions& gl, const Traits& traits, Format f
         support |= FormatSupport::color_target;
         if (!facts.is_integer() && (!is_32bit_float(format) || traits.float_blend)) support |= FormatSupport::blended;
     }
-    if (is_image_format(format, traits.es)) {
+    if (is_es_image_format(format) || (traits.image_formats && is_desktop_image_format(format))) {
         support |= FormatSupport::storage_image;
-        if (format == Format::r32_uint || format == Format::r32_sint) support |= FormatSupport::storage_atomic;
+        if (traits.image_atomics && (format == Format::r32_uint || format == Format::r32_sint))
+            support |= FormatSupport::storage_atomic;
     }
     if (facts.is_depth_stencil() || is_color_renderable(traits, format)) {
         std::array<GLint, 16> counts{};

@@ -22,6 +22,9 @@ const GlFormat& gl_format(rhi::Format format);
 /// What textures and vertices of a format can do in this context; `vertex` included.
 rhi::FormatSupport format_support(const Functions& gl, const Traits& traits, rhi::Format format);
 
+/// Formats of storage images that OpenGL ES 3.1 has without extensions (OpenGL ES 3.1, table 8.27).
+bool is_es_image_format(rhi::Format format);
+
 /// How attributes are read from memory.
 struct GlVertexFormat {
     GLenum type = 0;

@@ -10,6 +10,8 @@
 #include <memory>
 #include <utility>
 
+#include "backends/gl/formats.h"
+
 namespace nacre::gl {
 namespace {
 
@@ -62,7 +64,7 @@ class Translator {
 
     Expected<void> check() const {
         const rhi::ShaderReflection& reflection = shader_.reflection;
-        const auto lacking = [&](const char* what) {
+        const auto lacking = [&](std::string_view what) {
             return fail(ErrorCode::unsupported, "create pipeline", fmt::format("shader '{}'", shader_.name),
                         fmt::format("it uses {}, which {} does not have", what, traits_.es ? "OpenGL ES" : "OpenGL"),
                         "Ask the device's capabilities and offer a variant of the shader without them.");
@@ -71,6 +73,11 @@ class Translator {
         if (reflection.uses_ray_query) return lacking("ray queries (GL_EXT_ray_query)");
         for (const ReflectedBinding& binding : reflection.bindings)
             if (binding.count == 0) return lacking("an unbounded array of textures (descriptor indexing)");
+        for (const ReflectedBinding& binding : reflection.bindings)
+            if (!traits_.image_formats && binding.image_format != rhi::Format::undefined &&
+                !is_es_image_format(binding.image_format))
+                return lacking(fmt::format("a storage image of format {} (set {}, binding {})",
+                                           rhi::info(binding.image_format).name, binding.set, binding.binding));
         return {};
     }
 

@@ -85,6 +85,6 @@ Expected<Translation> translate(const rhi::BackendShader& shader,
                                 SlotAllocator& slots);
 
 /// Changes whenever `translate` gives other output for the same input; part of every cache key.
-inline constexpr std::uint32_t translation_version = 2;
+inline constexpr std::uint32_t translation_version = 3;
 
 }  // namespace nacre::gl

@@ -49,6 +49,8 @@ struct Traits {
     bool reset_status = false;
     bool desktop = false;            ///< 1D textures, direct read-back, provoking vertex, LOD bias, ...
     bool unorm16 = false;            ///< 16-bit unorm and snorm formats.
+    bool image_formats = false;      ///< Storage images of all formats of OpenGL 4.5.
+    bool image_atomics = false;
     bool snorm_targets = false;
     bool s3tc = false, s3tc_srgb = false, rgtc = false, bptc = false;
     bool program_binary = false;

@@ -11,15 +11,6 @@
 namespace nacre::rhi {
 namespace {
 
-/// The Vulkan device that every OpenGL device is compared with; null where the machine has none.
-Device* reference_device() {
-    static const std::unique_ptr<Device> device = [] {
-        auto made = instance().create_device({.backend = "vulkan", .name = "reference"});
-        return made ? *std::move(made) : nullptr;
-    }();
-    return device.get();
-}
-
 /// A picture of integers: what is drawn into it holds the bits of whatever a test looks at.
 struct Picture {
     std::uint32_t width = 64, height = 48;

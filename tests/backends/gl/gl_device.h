@@ -66,6 +66,15 @@ inline std::unique_ptr<Device> make_device(const DeviceKind& kind, DeviceDesc de
     return *std::move(device);
 }
 
+/// The Vulkan device that OpenGL devices are compared with; null where the machine has none.
+inline Device* reference_device() {
+    static const std::unique_ptr<Device> device = [] {
+        auto made = instance().create_device({.backend = "vulkan", .name = "reference"});
+        return made ? *std::move(made) : nullptr;
+    }();
+    return device.get();
+}
+
 template <typename T>
 T expect(Expected<T> value) {
     if (!value) {

@@ -13,14 +13,6 @@
 namespace nacre::rhi {
 namespace {
 
-Device* reference_device() {
-    static const std::unique_ptr<Device> device = [] {
-        auto made = instance().create_device({.backend = "vulkan", .name = "reference"});
-        return made ? *std::move(made) : nullptr;
-    }();
-    return device.get();
-}
-
 class GlTransferTest : public GlTest {
   protected:
     bool is_es() const { return std::string_view(GetParam().backend) == "gles"; }
