@@ -59,9 +59,9 @@ enum class AlphaMode {
 
 /// KHR_materials_clearcoat: a thin dielectric coat (ior 1.5) over everything.
 struct Clearcoat {
-    float factor = 0.0f;       ///< Coverage, [0, 1].
-    TextureReference texture;  ///< Channel r scales factor.
-    float roughness = 0.0f;    ///< Perceptual, [0, 1].
+    float factor = 0.0f;                 ///< Coverage, [0, 1].
+    TextureReference texture;            ///< Channel r scales factor.
+    float roughness = 0.0f;              ///< Perceptual, [0, 1].
     TextureReference roughness_texture;  ///< Channel g scales roughness.
     TextureReference normal_texture;     ///< The coat's own normals; without it, the geometric ones.
 };
@@ -97,9 +97,9 @@ struct Volume {
 
 /// KHR_materials_specular: strength and tint of the dielectric reflection.
 struct Specular {
-    float factor = 1.0f;           ///< [0, 1].
-    TextureReference texture;      ///< Channel a scales factor.
-    glm::vec3 color{1.0f};         ///< F0 tint; may exceed 1, the product with F0 is clamped.
+    float factor = 1.0f;             ///< [0, 1].
+    TextureReference texture;        ///< Channel a scales factor.
+    glm::vec3 color{1.0f};           ///< F0 tint; may exceed 1, the product with F0 is clamped.
     TextureReference color_texture;  ///< rgb, sRGB encoded.
 };
 
@@ -124,9 +124,9 @@ struct DiffuseTransmission {
 /// KHR_materials_pbrSpecularGlossiness: the older model, in place of base color, metallic and roughness.
 struct SpecularGlossiness {
     glm::vec4 diffuse{1.0f};
-    TextureReference diffuse_texture;  ///< rgba, rgb sRGB encoded.
-    glm::vec3 specular{1.0f};          ///< F0.
-    float glossiness = 1.0f;           ///< 1 - perceptual roughness.
+    TextureReference diffuse_texture;              ///< rgba, rgb sRGB encoded.
+    glm::vec3 specular{1.0f};                      ///< F0.
+    float glossiness = 1.0f;                       ///< 1 - perceptual roughness.
     TextureReference specular_glossiness_texture;  ///< rgb sRGB encoded: specular, a: glossiness.
 };
 
@@ -140,10 +140,10 @@ struct UnknownExtension {
 struct MaterialDescription {
     std::string name;
 
-    glm::vec4 base_color{1.0f};           ///< rgb: albedo or metal color, a: alpha.
-    TextureReference base_color_texture;  ///< rgba, rgb sRGB encoded.
-    float metallic = 1.0f;                ///< [0, 1].
-    float roughness = 1.0f;               ///< Perceptual (GGX alpha is its square), [0, 1].
+    glm::vec4 base_color{1.0f};                   ///< rgb: albedo or metal color, a: alpha.
+    TextureReference base_color_texture;          ///< rgba, rgb sRGB encoded.
+    float metallic = 1.0f;                        ///< [0, 1].
+    float roughness = 1.0f;                       ///< Perceptual (GGX alpha is its square), [0, 1].
     TextureReference metallic_roughness_texture;  ///< g: roughness, b: metallic.
 
     TextureReference normal_texture;     ///< Tangent space, rgb in [0, 1] to [-1, 1]; scale applies to x and y.

@@ -21,12 +21,13 @@ struct SingleSlab {
     float alpha = 1.0f;                   ///< Coverage or mask value, [0, 1].
     TextureReference base_color_texture;  ///< rgb: base_color, a: alpha.
 
-    float metallic = 0.0f;   ///< [0, 1].
-    float roughness = 1.0f;  ///< Perceptual, [0, 1]; GGX alpha is its square.
+    float metallic = 0.0f;                        ///< [0, 1].
+    float roughness = 1.0f;                       ///< Perceptual, [0, 1]; GGX alpha is its square.
     TextureReference metallic_roughness_texture;  ///< g: roughness, b: metallic.
 
-    glm::vec3 f0{0.04f};  ///< Reflectance of the dielectric interface at normal incidence, [0, 1], times the tints below.
-    float f90 = 1.0f;     ///< Reflectance of the dielectric interface at grazing incidence; metal has 1.
+    glm::vec3 f0{
+        0.04f};        ///< Reflectance of the dielectric interface at normal incidence, [0, 1], times the tints below.
+    float f90 = 1.0f;  ///< Reflectance of the dielectric interface at grazing incidence; metal has 1.
     TextureReference specular_texture;        ///< a: scales f0 and f90.
     TextureReference specular_color_texture;  ///< rgb: scales f0.
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/builtin.h"
 
-#include <algorithm>
-#include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
@@ -95,8 +96,8 @@ Scene spheres_scene() {
                 {0.95f, 0.62f, 0.35f}, static_cast<float>(column) / (columns - 1));
             material.metallic = static_cast<float>(row) / (rows - 1);
             const std::uint32_t index = add_material(scene, std::move(material));
-            const glm::vec3 position(static_cast<float>(column) - 0.5f * (columns - 1),
-                                     static_cast<float>(row) + 0.45f, 0.0f);
+            const glm::vec3 position(static_cast<float>(column) - 0.5f * (columns - 1), static_cast<float>(row) + 0.45f,
+                                     0.0f);
             place(scene, scene.materials[index].name, ball, index, moved_to(position));
         }
     }
@@ -107,8 +108,12 @@ Scene spheres_scene() {
     sun.color = {1.0f, 0.95f, 0.88f};
     sun.direction = glm::normalize(glm::vec3(-0.5f, -1.0f, -0.7f));
     scene.lights.push_back(sun);
-    scene.lights.push_back({.name = "lamp", .kind = LightKind::point, .color = {0.55f, 0.7f, 1.0f},
-                            .intensity = 9.0f, .position = {-4.5f, 4.0f, 3.0f}, .range = 20.0f});
+    scene.lights.push_back({.name = "lamp",
+                            .kind = LightKind::point,
+                            .color = {0.55f, 0.7f, 1.0f},
+                            .intensity = 9.0f,
+                            .position = {-4.5f, 4.0f, 3.0f},
+                            .range = 20.0f});
     Light spot = spot_at("spot", {4.5f, 6.5f, 4.0f}, {1.0f, 1.5f, 0.0f}, 40.0f, 24.0f);
     spot.color = {1.0f, 0.8f, 0.6f};
     scene.lights.push_back(spot);
@@ -144,7 +149,10 @@ Scene cornell_scene() {
     place(scene, "copper ball", sphere(0.6f, 96, 48), copper, moved_to({0.95f, 1.7f, 0.65f}));
     place(scene, "glossy ball", sphere(0.5f, 96, 48), glossy, moved_to({-1.2f, 0.5f, 1.4f}));
 
-    scene.lights.push_back({.name = "lamp", .kind = LightKind::point, .color = {1.0f, 0.85f, 0.6f}, .intensity = 14.0f,
+    scene.lights.push_back({.name = "lamp",
+                            .kind = LightKind::point,
+                            .color = {1.0f, 0.85f, 0.6f},
+                            .intensity = 14.0f,
                             .position = {0.0f, 2 * h - 0.35f, 0.0f}});
     scene.environment = studio_environment();
     scene.environment.intensity = 0.4f;  // the light that the walls would scatter
@@ -174,9 +182,9 @@ Scene grid_scene() {
                 const float x = coordinate(column), z = coordinate(row);
                 constexpr float step = 0.01f;
                 primitive.positions.emplace_back(x, height(x, z), z);
-                primitive.normals.push_back(glm::normalize(glm::vec3((height(x - step, z) - height(x + step, z)) / (2 * step),
-                                                                     1.0f,
-                                                                     (height(x, z - step) - height(x, z + step)) / (2 * step))));
+                primitive.normals.push_back(
+                    glm::normalize(glm::vec3((height(x - step, z) - height(x + step, z)) / (2 * step), 1.0f,
+                                             (height(x, z - step) - height(x, z + step)) / (2 * step))));
                 primitive.uv0.emplace_back(static_cast<float>(column) / squares, static_cast<float>(row) / squares);
             }
         }
@@ -189,7 +197,8 @@ Scene grid_scene() {
         update_bounds(primitive);
         const float t = static_cast<float>(strip) / (strips - 1);
         const std::uint32_t material = add_material(
-            scene, dielectric(fmt::format("strip {}", strip), {0.25f + 0.5f * t, 0.5f, 0.7f - 0.5f * t}, 0.25f + 0.5f * t));
+            scene,
+            dielectric(fmt::format("strip {}", strip), {0.25f + 0.5f * t, 0.5f, 0.7f - 0.5f * t}, 0.25f + 0.5f * t));
         scene.materials.back().metallic = strip % 4 == 3 ? 1.0f : 0.0f;
         place(scene, fmt::format("strip {}", strip), std::move(primitive), material);
     }
@@ -212,13 +221,19 @@ Image leaf_picture() {
             const float distance = std::min(outline - glm::length(at), glm::length(at) - 0.1f);  // inside is positive
             const float alpha = std::clamp(distance * 24.0f + 0.5f, 0.0f, 1.0f);
             const bool dark = ((x / 16) + (y / 16)) % 2 == 0;
-            pixels.insert(pixels.end(), {static_cast<std::uint8_t>(dark ? 140 : 235), static_cast<std::uint8_t>(dark ? 180 : 235),
-                                         static_cast<std::uint8_t>(dark ? 70 : 215),
-                                         static_cast<std::uint8_t>(std::lround(alpha * 255.0f))});
+            pixels.insert(
+                pixels.end(),
+                {static_cast<std::uint8_t>(dark ? 140 : 235), static_cast<std::uint8_t>(dark ? 180 : 235),
+                 static_cast<std::uint8_t>(dark ? 70 : 215), static_cast<std::uint8_t>(std::lround(alpha * 255.0f))});
         }
     }
-    return {.name = "leaf", .origin = "code", .color_space = ColorSpace::srgb, .width = side, .height = side,
-            .has_alpha = true, .pixels = std::make_shared<const std::vector<std::uint8_t>>(std::move(pixels))};
+    return {.name = "leaf",
+            .origin = "code",
+            .color_space = ColorSpace::srgb,
+            .width = side,
+            .height = side,
+            .has_alpha = true,
+            .pixels = std::make_shared<const std::vector<std::uint8_t>>(std::move(pixels))};
 }
 
 Scene alpha_scene() {
@@ -252,8 +267,9 @@ Scene alpha_scene() {
         material.double_sided = true;
         const std::uint32_t index = add_material(scene, std::move(material));
         const float x = 0.3f + 0.55f * static_cast<float>(pane);
-        place(scene, fmt::format("pane {}", pane), parallelogram({x, 0.3f + 0.3f * static_cast<float>(pane), depths[pane]},
-                                                                 {1.8f, 0, 0}, {0, 1.8f, 0}), index);
+        place(scene, fmt::format("pane {}", pane),
+              parallelogram({x, 0.3f + 0.3f * static_cast<float>(pane), depths[pane]}, {1.8f, 0, 0}, {0, 1.8f, 0}),
+              index);
     }
     Light sun{.name = "sun", .kind = LightKind::directional, .intensity = 1.5f};
     sun.direction = glm::normalize(glm::vec3(0.35f, -1.0f, -0.8f));
@@ -278,8 +294,12 @@ Scene lights_scene() {
     Light sun{.name = "directional", .kind = LightKind::directional, .color = {1.0f, 0.9f, 0.75f}, .intensity = 0.9f};
     sun.direction = glm::normalize(glm::vec3(-0.55f, -1.0f, -0.5f));
     scene.lights.push_back(sun);
-    scene.lights.push_back({.name = "point", .kind = LightKind::point, .color = {0.6f, 0.8f, 1.0f}, .intensity = 6.0f,
-                            .position = {0.1f, 2.4f, 0.6f}, .range = 12.0f});
+    scene.lights.push_back({.name = "point",
+                            .kind = LightKind::point,
+                            .color = {0.6f, 0.8f, 1.0f},
+                            .intensity = 6.0f,
+                            .position = {0.1f, 2.4f, 0.6f},
+                            .range = 12.0f});
     Light spot = spot_at("spot", {6.8f, 4.5f, 3.2f}, {5.0f, 0.6f, 0.0f}, 45.0f, 22.0f);
     spot.color = {1.0f, 0.55f, 0.5f};
     scene.lights.push_back(spot);
@@ -332,7 +352,8 @@ Expected<Scene> make_builtin_scene(std::string_view name) {
         if (scene.samplers.empty()) scene.samplers.emplace_back();
         return scene;
     }
-    return fail(ErrorCode::not_found, "load scene", fmt::format("'{}'", name), "there is no built-in scene of that name",
+    return fail(ErrorCode::not_found, "load scene", fmt::format("'{}'", name),
+                "there is no built-in scene of that name",
                 fmt::format("The built-in scenes are {}.", fmt::join(builtin_scene_names(), ", ")));
 }
 

@@ -47,11 +47,11 @@ glm::vec3 light_of(const SoftBox& lamp, const glm::vec3& direction) {
 glm::vec3 studio_light(const glm::vec3& direction) {
     // The part of the room that a camera looking along -Z sees is free of lamps.
     static const SoftBox lamps[] = {
-        {{0.1f, 1.0f, 0.35f}, 0.75f, 0.5f, 0.15f, {3.1f, 3.05f, 3.0f}},       // overhead
-        {{-0.9f, 0.55f, 0.6f}, 0.32f, 0.45f, 0.08f, {5.0f, 4.75f, 4.4f}},     // key, upper left front
-        {{1.0f, 0.2f, 0.35f}, 0.3f, 0.6f, 0.15f, {1.3f, 1.45f, 1.65f}},       // fill, right
-        {{0.9f, 0.35f, -0.42f}, 0.07f, 0.5f, 0.05f, {4.0f, 4.0f, 4.2f}},      // rim, behind on the right
-        {{-0.95f, 0.25f, -0.3f}, 0.05f, 0.4f, 0.05f, {2.4f, 2.4f, 2.5f}},     // rim, behind on the left
+        {{0.1f, 1.0f, 0.35f}, 0.75f, 0.5f, 0.15f, {3.1f, 3.05f, 3.0f}},    // overhead
+        {{-0.9f, 0.55f, 0.6f}, 0.32f, 0.45f, 0.08f, {5.0f, 4.75f, 4.4f}},  // key, upper left front
+        {{1.0f, 0.2f, 0.35f}, 0.3f, 0.6f, 0.15f, {1.3f, 1.45f, 1.65f}},    // fill, right
+        {{0.9f, 0.35f, -0.42f}, 0.07f, 0.5f, 0.05f, {4.0f, 4.0f, 4.2f}},   // rim, behind on the right
+        {{-0.95f, 0.25f, -0.3f}, 0.05f, 0.4f, 0.05f, {2.4f, 2.4f, 2.5f}},  // rim, behind on the left
     };
     // The room: walls that are brightest a little above the horizon, a darker floor.
     const float rise = direction.y - 0.12f;
@@ -82,9 +82,10 @@ Expected<Environment> load_environment(const std::string& path) {
     const ImageLimits limits{.max_width = 16384, .max_height = 8192};
     auto info = read_image_info(path, limits);
     if (info && info->format != ImageFormat::radiance && info->format != ImageFormat::openexr) {
-        return fail(ErrorCode::unsupported, "load environment", "'" + path + "'",
-                    fmt::format("it is a {} file, which cannot hold the brightness of a light source", name_of(info->format)),
-                    "Use a Radiance (.hdr) or OpenEXR (.exr) picture.");
+        return fail(
+            ErrorCode::unsupported, "load environment", "'" + path + "'",
+            fmt::format("it is a {} file, which cannot hold the brightness of a light source", name_of(info->format)),
+            "Use a Radiance (.hdr) or OpenEXR (.exr) picture.");
     }
     auto picture = info ? read_image(path, limits) : std::unexpected(info.error());
     if (!picture) {

@@ -23,8 +23,9 @@ namespace nacre::scene {
 
 /// The light of scenes that have none: a photo studio made by code, 512 x 256 texels. A gray room with a
 /// darker floor, one large soft box overhead in front, a key light to the upper left, a weaker and slightly bluish fill
-/// to the right and two narrow rim lights behind; none of them where a camera that looks along -Z sees it. Its mean luminance over the sphere is 0.5 cd/m2, so that a white
-/// diffuse surface shows about half of full white at exposure 0. The same texels on every machine and call.
+/// to the right and two narrow rim lights behind; none of them where a camera that looks along -Z sees it. Its mean
+/// luminance over the sphere is 0.5 cd/m2, so that a white diffuse surface shows about half of full white at exposure
+/// 0. The same texels on every machine and call.
 [[nodiscard]] Environment studio_environment();
 
 /// World direction (unit) of a point of the picture, before `Environment::rotation`. `uv` is (0, 0) in the upper left

@@ -36,7 +36,7 @@ struct LoadLimits {
 };
 
 struct LoadOptions {
-    std::optional<float> time;  ///< Seconds into the animation, clamped to its range; nothing: the pose at rest.
+    std::optional<float> time;    ///< Seconds into the animation, clamped to its range; nothing: the pose at rest.
     std::uint32_t animation = 0;  ///< Which animation of the file moves the scene, where `time` is given.
     bool load_images = true;      ///< false: pictures are not decoded but 1 x 1 white (geometry tools, tests).
     LoadLimits limits;

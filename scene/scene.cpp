@@ -73,8 +73,8 @@ Camera framing_camera(const Bounds& scene_bounds, float aspect_ratio) {
     float distance = 0.0f;
     for (int corner = 0; corner < 8; ++corner) {
         const glm::vec3 offset = half * glm::vec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
-        const float beyond = std::max(std::abs(glm::dot(offset, right)) / tangent_u,
-                                      std::abs(glm::dot(offset, up)) / tangent_v);
+        const float beyond =
+            std::max(std::abs(glm::dot(offset, right)) / tangent_u, std::abs(glm::dot(offset, up)) / tangent_v);
         distance = std::max(distance, beyond + glm::dot(offset, backward));
     }
     distance = std::max(distance * 1.08f, radius * 0.1f);  // a small margin around the picture

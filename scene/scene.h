@@ -55,7 +55,7 @@ struct Image {
     ColorSpace color_space = ColorSpace::linear;
     std::uint32_t width = 0;
     std::uint32_t height = 0;
-    bool has_alpha = false;  ///< Some texel has alpha below 255.
+    bool has_alpha = false;                                   ///< Some texel has alpha below 255.
     std::shared_ptr<const std::vector<std::uint8_t>> pixels;  ///< 4 * width * height bytes; never null.
 };
 
@@ -109,7 +109,7 @@ enum class Projection { perspective, orthographic };
 struct Camera {
     std::string name;
     Projection projection = Projection::perspective;
-    glm::mat4 world{1.0f};  ///< Camera to world, without scale: looks along -Z, +Y is up.
+    glm::mat4 world{1.0f};                     ///< Camera to world, without scale: looks along -Z, +Y is up.
     float vertical_field_of_view = 0.785398f;  ///< Perspective: full angle, radians, (0, pi).
     float aspect_ratio = 0.0f;                 ///< Perspective: width / height of the frame; 0: that of the picture.
     float half_width = 1.0f;                   ///< Orthographic: meters.
@@ -127,9 +127,9 @@ enum class LightKind { directional, point, spot };
 struct Light {
     std::string name;
     LightKind kind = LightKind::point;
-    glm::vec3 color{1.0f};      ///< Linear, multiplies intensity.
-    float intensity = 1.0f;     ///< Directional: lux. Point and spot: candela. >= 0.
-    glm::vec3 position{0.0f};   ///< World, meters. Point and spot.
+    glm::vec3 color{1.0f};                   ///< Linear, multiplies intensity.
+    float intensity = 1.0f;                  ///< Directional: lux. Point and spot: candela. >= 0.
+    glm::vec3 position{0.0f};                ///< World, meters. Point and spot.
     glm::vec3 direction{0.0f, 0.0f, -1.0f};  ///< World, unit: where the light travels to. Directional and spot.
     float range = std::numeric_limits<float>::infinity();  ///< Meters; light is faded to 0 at this distance.
     float inner_cone_angle = 0.0f;       ///< Spot: radians from the axis where fading begins, < outer_cone_angle.
@@ -161,10 +161,11 @@ struct Scene {
     std::vector<materials::MaterialDescription> materials;  ///< Never empty when there is a primitive.
     std::vector<Mesh> meshes;
     std::vector<Instance> instances;
-    std::vector<Camera> cameras;  ///< At least one; the first is the default. Made by `framing_camera` if the file has none.
+    std::vector<Camera>
+        cameras;  ///< At least one; the first is the default. Made by `framing_camera` if the file has none.
     std::vector<Light> lights;
-    Environment environment;  ///< Always present; `studio_environment()` where the source has none.
-    float time = 0.0f;        ///< Seconds at which animations were evaluated.
+    Environment environment;            ///< Always present; `studio_environment()` where the source has none.
+    float time = 0.0f;                  ///< Seconds at which animations were evaluated.
     std::vector<std::string> warnings;  ///< What was wrong but survivable, one sentence each.
 };
 

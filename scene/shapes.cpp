@@ -66,12 +66,12 @@ void append_parallelogram(Primitive& primitive, const glm::vec3& corner, const g
 Primitive box(const glm::vec3& half_size) {
     Primitive result;
     const float x = half_size.x, y = half_size.y, z = half_size.z;
-    append_parallelogram(result, {-x, -y, z}, {2 * x, 0, 0}, {0, 2 * y, 0});    // +Z
-    append_parallelogram(result, {x, -y, -z}, {-2 * x, 0, 0}, {0, 2 * y, 0});   // -Z
-    append_parallelogram(result, {x, -y, z}, {0, 0, -2 * z}, {0, 2 * y, 0});    // +X
-    append_parallelogram(result, {-x, -y, -z}, {0, 0, 2 * z}, {0, 2 * y, 0});   // -X
-    append_parallelogram(result, {-x, y, z}, {2 * x, 0, 0}, {0, 0, -2 * z});    // +Y
-    append_parallelogram(result, {-x, -y, -z}, {2 * x, 0, 0}, {0, 0, 2 * z});   // -Y
+    append_parallelogram(result, {-x, -y, z}, {2 * x, 0, 0}, {0, 2 * y, 0});   // +Z
+    append_parallelogram(result, {x, -y, -z}, {-2 * x, 0, 0}, {0, 2 * y, 0});  // -Z
+    append_parallelogram(result, {x, -y, z}, {0, 0, -2 * z}, {0, 2 * y, 0});   // +X
+    append_parallelogram(result, {-x, -y, -z}, {0, 0, 2 * z}, {0, 2 * y, 0});  // -X
+    append_parallelogram(result, {-x, y, z}, {2 * x, 0, 0}, {0, 0, -2 * z});   // +Y
+    append_parallelogram(result, {-x, -y, -z}, {2 * x, 0, 0}, {0, 0, 2 * z});  // -Y
     update_bounds(result);
     return result;
 }

@@ -14,7 +14,8 @@
 
 namespace nacre::scene {
 
-/// Sphere around the origin: `segments` around +Y (>= 3), `rings` from pole to pole (>= 2). u runs around, v from +Y down.
+/// Sphere around the origin: `segments` around +Y (>= 3), `rings` from pole to pole (>= 2). u runs around, v from +Y
+/// down.
 [[nodiscard]] Primitive sphere(float radius, std::uint32_t segments, std::uint32_t rings);
 
 /// Box around the origin with flat faces; every face shows the whole texture.

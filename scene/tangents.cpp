@@ -113,7 +113,8 @@ class TangentBuilder {
         for (std::uint32_t index = 0; index < triangles_.size(); ++index) {
             Triangle& triangle = triangles_[index];
             const std::uint32_t a = 3 * index, b = a + 1, c = a + 2;
-            triangle.degenerate = position(a) == position(b) || position(b) == position(c) || position(c) == position(a);
+            triangle.degenerate =
+                position(a) == position(b) || position(b) == position(c) || position(c) == position(a);
             const glm::dvec3 edge1 = glm::dvec3(position(b)) - glm::dvec3(position(a));
             const glm::dvec3 edge2 = glm::dvec3(position(c)) - glm::dvec3(position(a));
             // v grows downwards, the algorithm expects it to grow upwards.
@@ -236,7 +237,7 @@ class TangentBuilder {
     std::span<const glm::vec2> uv_;
     std::uint32_t corner_count_;
     std::uint32_t welded_count_ = 0;
-    std::vector<std::uint32_t> welded_;    ///< Per corner: number of its vertex.
+    std::vector<std::uint32_t> welded_;  ///< Per corner: number of its vertex.
     std::vector<Triangle> triangles_;
     std::vector<std::uint32_t> opposite_;  ///< Per corner: the corner that starts the same edge from its other end.
     std::vector<std::uint32_t> group_of_;  ///< Per corner.

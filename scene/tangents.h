@@ -15,7 +15,8 @@
 ///
 ///     add_flat_normals(primitive);
 ///     add_tangents(primitive, primitive.uv0);
-///     glm::vec3 bitangent = primitive.tangents[i].w * glm::cross(primitive.normals[i], glm::vec3(primitive.tangents[i]));
+///     glm::vec3 bitangent = primitive.tangents[i].w * glm::cross(primitive.normals[i],
+///     glm::vec3(primitive.tangents[i]));
 ///
 /// All functions are thread-safe for different primitives.
 

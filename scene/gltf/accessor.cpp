@@ -103,10 +103,12 @@ ElementBytes locate(Document& document, std::size_t view_index, std::uint64_t by
         reject(fmt::format("{}: bufferView {} has byteStride {}, but one element takes {} bytes", element, view_index,
                            stride, bytes_per_element));
     }
-    if (byte_offset % alignment != 0 || (view.buffer_offset + byte_offset) % alignment != 0 || stride % alignment != 0) {
-        reject(fmt::format("{}: its data at byte {} of the buffer, stride {}, is not aligned to its components of {} "
-                           "bytes",
-                           element, with_commas(view.buffer_offset + byte_offset), stride, alignment));
+    if (byte_offset % alignment != 0 || (view.buffer_offset + byte_offset) % alignment != 0 ||
+        stride % alignment != 0) {
+        reject(
+            fmt::format("{}: its data at byte {} of the buffer, stride {}, is not aligned to its components of {} "
+                        "bytes",
+                        element, with_commas(view.buffer_offset + byte_offset), stride, alignment));
     }
     const std::uint64_t available = view.bytes.size();
     const bool fits = byte_offset <= available && bytes_per_element <= available - byte_offset &&
@@ -151,8 +153,8 @@ void apply_sparse(Document& document, const AccessorInfo& info, const JsonView& 
     }
     const std::uint32_t index_size = size_of(index_info.component);
     const ElementBytes indices =
-        locate(document, indices_json.index("bufferView", view_count, "bufferView"), indices_json.whole("byteOffset", 0),
-               count, index_size, index_size, false, element + ", sparse indices");
+        locate(document, indices_json.index("bufferView", view_count, "bufferView"),
+               indices_json.whole("byteOffset", 0), count, index_size, index_size, false, element + ", sparse indices");
     const JsonView values_json = sparse.at("values");
     const ElementBytes replacements =
         locate(document, values_json.index("bufferView", view_count, "bufferView"), values_json.whole("byteOffset", 0),
@@ -230,8 +232,7 @@ AccessorInfo describe_accessor(Document& document, std::size_t accessor) {
     info.component = component_type(json.at("componentType"));
     info.normalized = json.flag("normalized", false);
     info.has_view = json.has("bufferView");
-    if (info.normalized &&
-        (info.component == ComponentType::float32 || info.component == ComponentType::uint32)) {
+    if (info.normalized && (info.component == ComponentType::float32 || info.component == ComponentType::uint32)) {
         reject(fmt::format("{}: only 8- and 16-bit integers can be normalized", label("accessor", accessor, json)));
     }
     const std::string type = json.text("type");

@@ -14,7 +14,7 @@ enum class Interpolation { linear, step, cubic_spline };
 
 /// The keyframes of one channel. With cubic splines each key has three values: in-tangent, value, out-tangent.
 struct Curve {
-    std::vector<float> times;   ///< Seconds, strictly increasing.
+    std::vector<float> times;  ///< Seconds, strictly increasing.
     std::vector<float> values;
     std::size_t components = 0;  ///< Of one value.
     Interpolation interpolation = Interpolation::linear;
@@ -97,11 +97,11 @@ Curve read_curve(Document& document, const JsonView& sampler, const std::string&
     }
     const std::size_t values_per_key = curve.interpolation == Interpolation::cubic_spline ? 3 : 1;
     if (curve.values.size() != curve.times.size() * values_per_key * components) {
-        reject(fmt::format("{}: {} keys with {} values of {} components each need {} numbers, but the output accessor "
-                           "holds {}",
-                           element, curve.times.size(), values_per_key, components,
-                           with_commas(curve.times.size() * values_per_key * components),
-                           with_commas(curve.values.size())));
+        reject(fmt::format(
+            "{}: {} keys with {} values of {} components each need {} numbers, but the output accessor "
+            "holds {}",
+            element, curve.times.size(), values_per_key, components,
+            with_commas(curve.times.size() * values_per_key * components), with_commas(curve.values.size())));
     }
     return curve;
 }
@@ -121,7 +121,8 @@ void apply_animation(Document& document, std::vector<Node>& nodes, std::size_t a
         const auto node_index = target.find_index("node", nodes.size(), "node");
         const std::string path = target.text("path");
         if (!node_index) continue;  // Extensions may animate other things; glTF says to skip such channels.
-        const JsonView& sampler = samplers[channels[index].index("sampler", samplers.size(), "sampler of its animation")];
+        const JsonView& sampler =
+            samplers[channels[index].index("sampler", samplers.size(), "sampler of its animation")];
 
         std::size_t components = 0;
         if (path == "translation" || path == "scale") {
@@ -132,8 +133,8 @@ void apply_animation(Document& document, std::vector<Node>& nodes, std::size_t a
             components = morph_target_count(document, *node_index);
         }
         if (components == 0) {
-            document.warnings().add(fmt::format("{}: its target '{}' is not known or has nothing to move; it was left out",
-                                                element, printable(path)));
+            document.warnings().add(fmt::format(
+                "{}: its target '{}' is not known or has nothing to move; it was left out", element, printable(path)));
             continue;
         }
         const std::vector<float> value =

@@ -85,7 +85,8 @@ void Document::read_container(std::span<const std::byte> bytes) {
                    std::string(truncated_remedy));
         }
         if (length < bytes.size()) {
-            warnings_.add(fmt::format("{} bytes after the end of the .glb were ignored", with_commas(bytes.size() - length)));
+            warnings_.add(
+                fmt::format("{} bytes after the end of the .glb were ignored", with_commas(bytes.size() - length)));
         }
         json_text = {};
         bool has_json = false;
@@ -117,7 +118,8 @@ void Document::read_container(std::span<const std::byte> bytes) {
     if (json_text.size() > options_.limits.json_bytes) {
         reject(fmt::format("the JSON text has {} bytes; the limit is {}", with_commas(json_text.size()),
                            with_commas(options_.limits.json_bytes)),
-               "Move geometry and pictures out of data URIs into a .glb or files of their own.", ErrorCode::out_of_memory);
+               "Move geometry and pictures out of data URIs into a .glb or files of their own.",
+               ErrorCode::out_of_memory);
     }
     json_ = parse_json(json_text, options_.limits.json_depth);
 }
@@ -142,8 +144,9 @@ void Document::check_extensions() {
         }
     }
     if (!unknown.empty()) {
-        reject(fmt::format("/extensionsRequired: the file cannot be read without {}, which Nacre does not know", unknown),
-               "Export the file without it.", ErrorCode::unsupported);
+        reject(
+            fmt::format("/extensionsRequired: the file cannot be read without {}, which Nacre does not know", unknown),
+            "Export the file without it.", ErrorCode::unsupported);
     }
     for (const JsonView& entry : root().list("extensionsUsed")) {
         if (const std::string name = entry.as_text(); !is_supported(name)) {

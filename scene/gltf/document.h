@@ -22,8 +22,8 @@ namespace nacre::scene::gltf {
 /// Bytes of a bufferView.
 struct ViewBytes {
     std::span<const std::byte> bytes;
-    std::size_t stride = 0;        ///< 0: elements follow each other.
-    std::size_t buffer_offset = 0; ///< Of the first byte in its buffer, for alignment checks.
+    std::size_t stride = 0;         ///< 0: elements follow each other.
+    std::size_t buffer_offset = 0;  ///< Of the first byte in its buffer, for alignment checks.
 };
 
 class Document {
@@ -76,7 +76,7 @@ class Document {
     bool has_binary_chunk_ = false;
     std::map<std::string, std::vector<JsonView>, std::less<>> lists_;
     std::vector<Buffer> buffers_;
-    std::uint64_t source_bytes_ = 0;    ///< Of the file itself and all buffers so far.
+    std::uint64_t source_bytes_ = 0;  ///< Of the file itself and all buffers so far.
     std::uint64_t geometry_bytes_ = 0;
     std::uint64_t image_bytes_ = 0;
 };

@@ -62,8 +62,10 @@ Encoded read_encoded(Document& document, std::size_t index) {
 /// Checks the size of a picture against the limits, before a texel is decoded.
 void inspect(Document& document, Encoded& encoded) {
     const LoadLimits& limits = document.options().limits;
-    const ImageLimits image_limits{.max_width = limits.image_side, .max_height = limits.image_side,
-                                   .max_pixels = limits.image_bytes / 4, .max_file_bytes = limits.file_bytes};
+    const ImageLimits image_limits{.max_width = limits.image_side,
+                                   .max_height = limits.image_side,
+                                   .max_pixels = limits.image_bytes / 4,
+                                   .max_file_bytes = limits.file_bytes};
     auto info = read_image_info(encoded.bytes, encoded.element, image_limits);
     if (!info) reject_picture(encoded, info.error());
     if (info->format != ImageFormat::png && info->format != ImageFormat::jpeg) {
@@ -104,12 +106,13 @@ void decode_all(std::vector<Encoded>& pictures, const ImageLimits& limits) {
             try {
                 decode(pictures[i], limits);
             } catch (const std::exception& exception) {
-                pictures[i].error = Error{ErrorCode::out_of_memory, "decode", pictures[i].element, exception.what(), ""};
+                pictures[i].error =
+                    Error{ErrorCode::out_of_memory, "decode", pictures[i].element, exception.what(), ""};
             }
         }
     };
-    const std::size_t thread_count =
-        std::min<std::size_t>(std::max(1u, std::thread::hardware_concurrency()), std::min<std::size_t>(pictures.size(), 8));
+    const std::size_t thread_count = std::min<std::size_t>(std::max(1u, std::thread::hardware_concurrency()),
+                                                           std::min<std::size_t>(pictures.size(), 8));
     std::vector<std::jthread> threads;
     for (std::size_t i = 1; i < thread_count; ++i) {
         try {
@@ -140,8 +143,10 @@ std::vector<Image> ImageTable::load(Document& document) const {
     }
     if (document.options().load_images) {
         const LoadLimits& limits = document.options().limits;
-        decode_all(pictures, {.max_width = limits.image_side, .max_height = limits.image_side,
-                              .max_pixels = limits.image_bytes / 4, .max_file_bytes = limits.file_bytes});
+        decode_all(pictures, {.max_width = limits.image_side,
+                              .max_height = limits.image_side,
+                              .max_pixels = limits.image_bytes / 4,
+                              .max_file_bytes = limits.file_bytes});
     }
 
     static const auto white = std::make_shared<const std::vector<std::uint8_t>>(4, std::uint8_t{255});
@@ -149,8 +154,13 @@ std::vector<Image> ImageTable::load(Document& document) const {
     for (const auto& [file_image, color_space] : used_) {
         const Encoded& picture = pictures[picture_of.at(file_image)];
         if (picture.error) reject_picture(picture, *picture.error);
-        Image image{.name = picture.name, .origin = picture.origin, .mime_type = picture.mime_type,
-                    .color_space = color_space, .width = 1, .height = 1, .pixels = white};
+        Image image{.name = picture.name,
+                    .origin = picture.origin,
+                    .mime_type = picture.mime_type,
+                    .color_space = color_space,
+                    .width = 1,
+                    .height = 1,
+                    .pixels = white};
         if (picture.pixels) {
             image.width = picture.info.width;
             image.height = picture.info.height;

@@ -38,7 +38,8 @@ class Importer {
         for (const std::size_t index : placed_nodes(document_, nodes)) {
             const Node& node = nodes[index];
             if (!is_finite(node.world)) {
-                document_.warnings().add(node.element + ": its transform is not finite, and what it holds was left out");
+                document_.warnings().add(node.element +
+                                         ": its transform is not finite, and what it holds was left out");
                 continue;
             }
             const JsonView& json = document_.list("nodes")[index];
@@ -183,7 +184,8 @@ std::vector<glm::mat4> Importer::joint_worlds(std::size_t skin, const std::vecto
     for (const JsonView& joint : json.list("joints")) {
         const std::uint64_t index = joint.as_whole();
         if (index >= nodes.size()) {
-            reject(fmt::format("{}: refers to node {}, but the file has only {}", joint.pointer(), index, nodes.size()));
+            reject(
+                fmt::format("{}: refers to node {}, but the file has only {}", joint.pointer(), index, nodes.size()));
         }
         result.push_back(nodes[index].world);
     }
@@ -247,7 +249,8 @@ void Importer::place_camera(const JsonView& json, const Node& node) {
         camera_json.at("type").reject_as("perspective or orthographic");
     }
     if (!valid) {
-        document_.warnings().add(element + ": its numbers make no picture (angle, distances or transform), and it was left out");
+        document_.warnings().add(element +
+                                 ": its numbers make no picture (angle, distances or transform), and it was left out");
         return;
     }
     camera.world = *world;

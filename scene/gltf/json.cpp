@@ -131,7 +131,8 @@ std::string described(const json& value) {
     switch (value.type()) {
         case json::value_t::null: return "null";
         case json::value_t::boolean: return value.get<bool>() ? "true" : "false";
-        case json::value_t::string: return fmt::format("the text \"{}\"", printable(value.get_ref<const std::string&>(), 40));
+        case json::value_t::string:
+            return fmt::format("the text \"{}\"", printable(value.get_ref<const std::string&>(), 40));
         case json::value_t::array: return fmt::format("an array of {}", value.size());
         case json::value_t::object: return "an object";
         default: return fmt::format("the number {}", value.dump());
@@ -202,7 +203,9 @@ std::size_t JsonView::size() const {
     return value_->size();
 }
 
-JsonView JsonView::operator[](std::size_t index) const { return {&(*value_)[index], fmt::format("{}/{}", pointer_, index)}; }
+JsonView JsonView::operator[](std::size_t index) const {
+    return {&(*value_)[index], fmt::format("{}/{}", pointer_, index)};
+}
 
 std::vector<JsonView> JsonView::elements() const {
     std::vector<JsonView> result;
@@ -325,8 +328,6 @@ std::vector<float> JsonView::reals(std::string_view key) const {
     return result;
 }
 
-std::string JsonView::dump() const {
-    return value_->dump(-1, ' ', false, json::error_handler_t::replace);
-}
+std::string JsonView::dump() const { return value_->dump(-1, ' ', false, json::error_handler_t::replace); }
 
 }  // namespace nacre::scene::gltf

@@ -44,8 +44,8 @@ class JsonView {
     [[nodiscard]] std::string as_text() const;
     [[nodiscard]] std::string_view as_text_view() const;  ///< Valid while the document lives.
     [[nodiscard]] bool as_flag() const;
-    [[nodiscard]] float as_real() const;            ///< Finite as a 32-bit float.
-    [[nodiscard]] std::uint64_t as_whole() const;   ///< >= 0; "3.0" counts as whole.
+    [[nodiscard]] float as_real() const;           ///< Finite as a 32-bit float.
+    [[nodiscard]] std::uint64_t as_whole() const;  ///< >= 0; "3.0" counts as whole.
     void require_object() const;
 
     /// Members with a type. Without a fallback, absence is rejected.

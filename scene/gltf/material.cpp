@@ -84,63 +84,57 @@ void MaterialReader::read_extension(const std::string& name, const JsonView& jso
     } else if (name == "KHR_materials_dispersion") {
         material.dispersion = ranged(json, "dispersion", 0.0f, 0.0f, unbounded);
     } else if (name == "KHR_materials_clearcoat") {
-        material.clearcoat = Clearcoat{
-            .factor = ranged(json, "clearcoatFactor", 0.0f, 0.0f, 1.0f),
-            .texture = texture(json, "clearcoatTexture", linear),
-            .roughness = ranged(json, "clearcoatRoughnessFactor", 0.0f, 0.0f, 1.0f),
-            .roughness_texture = texture(json, "clearcoatRoughnessTexture", linear),
-            .normal_texture = texture(json, "clearcoatNormalTexture", linear)};
+        material.clearcoat = Clearcoat{.factor = ranged(json, "clearcoatFactor", 0.0f, 0.0f, 1.0f),
+                                       .texture = texture(json, "clearcoatTexture", linear),
+                                       .roughness = ranged(json, "clearcoatRoughnessFactor", 0.0f, 0.0f, 1.0f),
+                                       .roughness_texture = texture(json, "clearcoatRoughnessTexture", linear),
+                                       .normal_texture = texture(json, "clearcoatNormalTexture", linear)};
     } else if (name == "KHR_materials_sheen") {
-        material.sheen = Sheen{
-            .color = json.vector("sheenColorFactor", glm::vec3(0.0f)),
-            .color_texture = texture(json, "sheenColorTexture", srgb),
-            .roughness = ranged(json, "sheenRoughnessFactor", 0.0f, 0.0f, 1.0f),
-            .roughness_texture = texture(json, "sheenRoughnessTexture", linear)};
+        material.sheen = Sheen{.color = json.vector("sheenColorFactor", glm::vec3(0.0f)),
+                               .color_texture = texture(json, "sheenColorTexture", srgb),
+                               .roughness = ranged(json, "sheenRoughnessFactor", 0.0f, 0.0f, 1.0f),
+                               .roughness_texture = texture(json, "sheenRoughnessTexture", linear)};
     } else if (name == "KHR_materials_anisotropy") {
-        material.anisotropy = Anisotropy{
-            .strength = ranged(json, "anisotropyStrength", 0.0f, 0.0f, 1.0f),
-            .rotation = json.real("anisotropyRotation", 0.0f),
-            .texture = texture(json, "anisotropyTexture", linear)};
+        material.anisotropy = Anisotropy{.strength = ranged(json, "anisotropyStrength", 0.0f, 0.0f, 1.0f),
+                                         .rotation = json.real("anisotropyRotation", 0.0f),
+                                         .texture = texture(json, "anisotropyTexture", linear)};
     } else if (name == "KHR_materials_transmission") {
-        material.transmission = Transmission{
-            .factor = ranged(json, "transmissionFactor", 0.0f, 0.0f, 1.0f),
-            .texture = texture(json, "transmissionTexture", linear)};
+        material.transmission = Transmission{.factor = ranged(json, "transmissionFactor", 0.0f, 0.0f, 1.0f),
+                                             .texture = texture(json, "transmissionTexture", linear)};
     } else if (name == "KHR_materials_volume") {
-        material.volume = Volume{
-            .thickness = ranged(json, "thicknessFactor", 0.0f, 0.0f, unbounded),
-            .thickness_texture = texture(json, "thicknessTexture", linear),
-            .attenuation_color = json.vector("attenuationColor", glm::vec3(1.0f))};
+        material.volume = Volume{.thickness = ranged(json, "thicknessFactor", 0.0f, 0.0f, unbounded),
+                                 .thickness_texture = texture(json, "thicknessTexture", linear),
+                                 .attenuation_color = json.vector("attenuationColor", glm::vec3(1.0f))};
         if (json.has("attenuationDistance")) {
             material.volume->attenuation_distance = ranged(json, "attenuationDistance", 1.0f, 0.0f, unbounded);
         }
     } else if (name == "KHR_materials_specular") {
-        material.specular = Specular{
-            .factor = ranged(json, "specularFactor", 1.0f, 0.0f, 1.0f),
-            .texture = texture(json, "specularTexture", linear),
-            .color = json.vector("specularColorFactor", glm::vec3(1.0f)),
-            .color_texture = texture(json, "specularColorTexture", srgb)};
+        material.specular = Specular{.factor = ranged(json, "specularFactor", 1.0f, 0.0f, 1.0f),
+                                     .texture = texture(json, "specularTexture", linear),
+                                     .color = json.vector("specularColorFactor", glm::vec3(1.0f)),
+                                     .color_texture = texture(json, "specularColorTexture", srgb)};
     } else if (name == "KHR_materials_iridescence") {
         constexpr float meters_per_nanometer = 1e-9f;
-        material.iridescence = Iridescence{
-            .factor = ranged(json, "iridescenceFactor", 0.0f, 0.0f, 1.0f),
-            .texture = texture(json, "iridescenceTexture", linear),
-            .ior = ranged(json, "iridescenceIor", 1.3f, 1.0f, unbounded),
-            .thickness_minimum = meters_per_nanometer * json.real("iridescenceThicknessMinimum", 100.0f),
-            .thickness_maximum = meters_per_nanometer * json.real("iridescenceThicknessMaximum", 400.0f),
-            .thickness_texture = texture(json, "iridescenceThicknessTexture", linear)};
+        material.iridescence =
+            Iridescence{.factor = ranged(json, "iridescenceFactor", 0.0f, 0.0f, 1.0f),
+                        .texture = texture(json, "iridescenceTexture", linear),
+                        .ior = ranged(json, "iridescenceIor", 1.3f, 1.0f, unbounded),
+                        .thickness_minimum = meters_per_nanometer * json.real("iridescenceThicknessMinimum", 100.0f),
+                        .thickness_maximum = meters_per_nanometer * json.real("iridescenceThicknessMaximum", 400.0f),
+                        .thickness_texture = texture(json, "iridescenceThicknessTexture", linear)};
     } else if (name == "KHR_materials_diffuse_transmission") {
-        material.diffuse_transmission = DiffuseTransmission{
-            .factor = ranged(json, "diffuseTransmissionFactor", 0.0f, 0.0f, 1.0f),
-            .texture = texture(json, "diffuseTransmissionTexture", linear),
-            .color = json.vector("diffuseTransmissionColorFactor", glm::vec3(1.0f)),
-            .color_texture = texture(json, "diffuseTransmissionColorTexture", srgb)};
+        material.diffuse_transmission =
+            DiffuseTransmission{.factor = ranged(json, "diffuseTransmissionFactor", 0.0f, 0.0f, 1.0f),
+                                .texture = texture(json, "diffuseTransmissionTexture", linear),
+                                .color = json.vector("diffuseTransmissionColorFactor", glm::vec3(1.0f)),
+                                .color_texture = texture(json, "diffuseTransmissionColorTexture", srgb)};
     } else if (name == "KHR_materials_pbrSpecularGlossiness") {
-        material.specular_glossiness = SpecularGlossiness{
-            .diffuse = json.vector("diffuseFactor", glm::vec4(1.0f)),
-            .diffuse_texture = texture(json, "diffuseTexture", srgb),
-            .specular = json.vector("specularFactor", glm::vec3(1.0f)),
-            .glossiness = ranged(json, "glossinessFactor", 1.0f, 0.0f, 1.0f),
-            .specular_glossiness_texture = texture(json, "specularGlossinessTexture", srgb)};
+        material.specular_glossiness =
+            SpecularGlossiness{.diffuse = json.vector("diffuseFactor", glm::vec4(1.0f)),
+                               .diffuse_texture = texture(json, "diffuseTexture", srgb),
+                               .specular = json.vector("specularFactor", glm::vec3(1.0f)),
+                               .glossiness = ranged(json, "glossinessFactor", 1.0f, 0.0f, 1.0f),
+                               .specular_glossiness_texture = texture(json, "specularGlossinessTexture", srgb)};
     } else {
         material.other_extensions.push_back({printable(name), json.dump()});
     }
@@ -159,9 +153,10 @@ void MaterialReader::assign_uv_sets(ImportedMaterial& material) {
         const auto set = static_cast<std::uint32_t>(reference.uv_set);
         reference.uv_set = set == material.uv_sources[1] ? 1 : 0;
         if (set != material.uv_sources[0] && set != material.uv_sources[1]) {
-            document_.warnings().add(fmt::format("{}: it uses more than two sets of texture coordinates; TEXCOORD_{} "
-                                                 "was replaced by TEXCOORD_{}",
-                                                 element_, set, material.uv_sources[0]));
+            document_.warnings().add(
+                fmt::format("{}: it uses more than two sets of texture coordinates; TEXCOORD_{} "
+                            "was replaced by TEXCOORD_{}",
+                            element_, set, material.uv_sources[0]));
         }
     });
 }
@@ -188,8 +183,8 @@ ImportedMaterial MaterialReader::read(const JsonView& json) {
     } else if (alpha_mode == "BLEND") {
         material.alpha_mode = AlphaMode::blend;
     } else if (alpha_mode != "OPAQUE") {
-        document_.warnings().add(fmt::format("{}: alphaMode '{}' is not known; OPAQUE was used", element_,
-                                             printable(alpha_mode)));
+        document_.warnings().add(
+            fmt::format("{}: alphaMode '{}' is not known; OPAQUE was used", element_, printable(alpha_mode)));
     }
     material.alpha_cutoff = ranged(json, "alphaCutoff", 0.5f, 0.0f, unbounded);
     material.double_sided = json.flag("doubleSided", false);

@@ -15,7 +15,8 @@ Node read_node(Document& document, std::size_t index, std::size_t node_count) {
     for (const JsonView& child : json.list("children")) {
         const std::uint64_t child_index = child.as_whole();
         if (child_index >= node_count) {
-            reject(fmt::format("{}: refers to node {}, but the file has only {}", child.pointer(), child_index, node_count));
+            reject(fmt::format("{}: refers to node {}, but the file has only {}", child.pointer(), child_index,
+                               node_count));
         }
         node.children.push_back(child_index);
     }
@@ -104,7 +105,8 @@ std::vector<Node> read_nodes(Document& document) {
     for (const std::size_t index : walk(nodes, roots_of(nodes))) below_a_root[index] = true;
     for (std::size_t index = 0; index < count; ++index) {
         if (!below_a_root[index]) {
-            reject(fmt::format("{}: its chain of parents is a cycle, but the nodes must form a tree", nodes[index].element));
+            reject(fmt::format("{}: its chain of parents is a cycle, but the nodes must form a tree",
+                               nodes[index].element));
         }
     }
     return nodes;

@@ -94,7 +94,8 @@ void PrimitiveReader::read_attributes() {
     const std::size_t positions = attributes.index("POSITION", accessor_count, "accessor");
     vertex_count_ = describe_accessor(document_, positions).count;
     if (vertex_count_ > 0xffffffffu) {
-        reject(fmt::format("{}: it has {} vertices; 32-bit indices reach 4,294,967,295", element_, with_commas(vertex_count_)));
+        reject(fmt::format("{}: it has {} vertices; 32-bit indices reach 4,294,967,295", element_,
+                           with_commas(vertex_count_)));
     }
     primitive_.positions = read_vec3(document_, positions, element_);
     if (const auto accessor = attribute(attributes, "NORMAL")) {
@@ -179,7 +180,8 @@ void PrimitiveReader::apply_skin() {
     if (vertex_count_ == 0 || pose_.joint_worlds.empty()) return;
     const JsonView attributes = json_.at("attributes");
     if (!attributes.has("JOINTS_0") || !attributes.has("WEIGHTS_0")) {
-        document_.warnings().add(element_ + ": its node has a skin, but it has no joints and weights; it was not moved");
+        document_.warnings().add(element_ +
+                                 ": its node has a skin, but it has no joints and weights; it was not moved");
         return;
     }
 
@@ -351,7 +353,7 @@ void PrimitiveReader::complete_tangents() {
             const double length = glm::length(wide);
             const bool valid = length > 0.0 && std::isfinite(length);
             if (!valid) ++broken;
-            const glm::vec3 direction = valid ? glm::vec3(wide / length)
+            const glm::vec3 direction = valid                        ? glm::vec3(wide / length)
                                         : primitive_.normals.empty() ? glm::vec3(1.0f, 0.0f, 0.0f)
                                                                      : any_perpendicular(primitive_.normals[i]);
             tangent = glm::vec4(direction, tangent.w < 0.0f ? -1.0f : 1.0f);

@@ -18,8 +18,9 @@ namespace nacre::scene::gltf {
 
 /// How a mesh is deformed at one node.
 struct Pose {
-    std::vector<float> weights;          ///< Of morph targets; missing ones are 0.
-    std::vector<glm::mat4> joint_worlds; ///< World transform of each joint times its inverse bind matrix; empty: no skin.
+    std::vector<float> weights;  ///< Of morph targets; missing ones are 0.
+    std::vector<glm::mat4>
+        joint_worlds;  ///< World transform of each joint times its inverse bind matrix; empty: no skin.
 };
 
 /// Reads one primitive of a mesh in a pose. `element` is "mesh 3 'wheel', primitive 0"; `material` must be that of

@@ -14,7 +14,15 @@
 namespace nacre::scene::gltf {
 
 /// As numbered by glTF.
-enum class PrimitiveMode : std::uint8_t { points, lines, line_loop, line_strip, triangles, triangle_strip, triangle_fan };
+enum class PrimitiveMode : std::uint8_t {
+    points,
+    lines,
+    line_loop,
+    line_strip,
+    triangles,
+    triangle_strip,
+    triangle_fan
+};
 
 /// What a mode becomes.
 Topology topology_of(PrimitiveMode mode);

@@ -33,8 +33,7 @@ int hex_value(char c) {
 }
 
 bool starts_with_ignoring_case(std::string_view text, std::string_view prefix) {
-    return text.size() >= prefix.size() &&
-           std::equal(prefix.begin(), prefix.end(), text.begin(), [](char a, char b) {
+    return text.size() >= prefix.size() && std::equal(prefix.begin(), prefix.end(), text.begin(), [](char a, char b) {
                return a == static_cast<char>(std::tolower(static_cast<unsigned char>(b)));
            });
 }
@@ -87,8 +86,7 @@ std::optional<DataUri> parse_data_uri(std::string_view uri, std::string_view ele
     return DataUri{std::string(header.substr(0, header.find(';'))), uri.substr(comma + 1)};
 }
 
-std::filesystem::path path_of_uri(std::string_view uri, const std::filesystem::path& folder,
-                                  std::string_view element) {
+std::filesystem::path path_of_uri(std::string_view uri, const std::filesystem::path& folder, std::string_view element) {
     const auto refuse = [&](std::string_view why, std::string_view remedy) {
         reject(fmt::format("{}: the URI '{}' {}", element, printable(uri), why), std::string(remedy),
                ErrorCode::invalid_argument);
@@ -121,7 +119,8 @@ std::filesystem::path path_of_uri(std::string_view uri, const std::filesystem::p
         refuse("leaves the folder of the scene by '..'", stays_inside);
     }
     if (folder.empty()) {
-        refuse("names a file, but the scene was not read from a folder", "Embed the data, or load the scene by its path.");
+        refuse("names a file, but the scene was not read from a folder",
+               "Embed the data, or load the scene by its path.");
     }
     return folder / relative;
 }

@@ -69,8 +69,8 @@ TEST(SingleSlab, ValuesOutOfRangeAreClampedAndNotANumberBecomesTheDefault) {
 
 TEST(SingleSlab, SpecularGlossinessBecomesADielectric) {
     MaterialDescription material;
-    material.specular_glossiness = SpecularGlossiness{
-        .diffuse = {0.1f, 0.2f, 0.3f, 0.4f}, .specular = {0.5f, 0.6f, 0.7f}, .glossiness = 0.75f};
+    material.specular_glossiness =
+        SpecularGlossiness{.diffuse = {0.1f, 0.2f, 0.3f, 0.4f}, .specular = {0.5f, 0.6f, 0.7f}, .glossiness = 0.75f};
     const SingleSlab slab = single_slab(material);
     EXPECT_EQ(slab.base_color, glm::vec3(0.1f, 0.2f, 0.3f));
     EXPECT_EQ(slab.alpha, 0.4f);

@@ -16,8 +16,8 @@ namespace nacre {
 /// Nothing where the folder does not exist; tests that need it are then skipped.
 inline std::optional<std::filesystem::path> asset_folder() {
     const char* named = std::getenv("NACRE_ASSETS");
-    const std::filesystem::path folder = named ? std::filesystem::path(named)
-                                               : std::filesystem::path(NACRE_SOURCE_DIR) / ".." / "shared" / "assets";
+    const std::filesystem::path folder =
+        named ? std::filesystem::path(named) : std::filesystem::path(NACRE_SOURCE_DIR) / ".." / "shared" / "assets";
     if (!std::filesystem::is_directory(folder)) return std::nullopt;
     return folder;
 }

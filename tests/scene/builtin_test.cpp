@@ -41,8 +41,7 @@ TEST(Builtin, FacesWindCounterClockwiseAgainstTheirNormals) {
                 if (p.topology != Topology::triangle_list) continue;
                 for (std::size_t i = 0; i < p.indices.size(); i += 3) {
                     const std::uint32_t a = p.indices[i], b = p.indices[i + 1], c = p.indices[i + 2];
-                    const glm::vec3 face =
-                        glm::cross(p.positions[b] - p.positions[a], p.positions[c] - p.positions[a]);
+                    const glm::vec3 face = glm::cross(p.positions[b] - p.positions[a], p.positions[c] - p.positions[a]);
                     ASSERT_GT(glm::dot(face, p.normals[a] + p.normals[b] + p.normals[c]), 0.0f) << mesh.name;
                 }
             }
@@ -102,7 +101,8 @@ TEST(Camera, FramingSeesEveryCornerAndIsNotFarAway) {
         const glm::vec3 seen = glm::vec3(view * glm::vec4(point, 1.0f));
         EXPECT_LT(seen.z, -camera.near_distance);
         EXPECT_GT(seen.z, -camera.far_distance);
-        largest = std::max({largest, std::abs(seen.x) / (-seen.z * tangent * 1.5f), std::abs(seen.y) / (-seen.z * tangent)});
+        largest =
+            std::max({largest, std::abs(seen.x) / (-seen.z * tangent * 1.5f), std::abs(seen.y) / (-seen.z * tangent)});
     }
     EXPECT_LT(largest, 1.0f);
     EXPECT_GT(largest, 0.8f);

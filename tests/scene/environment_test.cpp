@@ -33,8 +33,11 @@ class EnvironmentFile : public testing::Test {
 TEST_F(EnvironmentFile, OpenExrIsReadAndBrokenTexelsAreMended) {
     const float nan = std::numeric_limits<float>::quiet_NaN();
     const float infinity = std::numeric_limits<float>::infinity();
-    const nacre::Image picture{.width = 2, .height = 2, .channels = 3,
-                               .pixels = {1.5f, 2.5f, 3.5f, nan, -1.0f, infinity, 1e30f, -infinity, 0.0f, 0.25f, 0.5f, 0.75f}};
+    const nacre::Image picture{
+        .width = 2,
+        .height = 2,
+        .channels = 3,
+        .pixels = {1.5f, 2.5f, 3.5f, nan, -1.0f, infinity, 1e30f, -infinity, 0.0f, 0.25f, 0.5f, 0.75f}};
     ASSERT_TRUE(write_exr(path("sky.exr"), make_layered_image(picture)));
     const Expected<Environment> environment = load_environment(path("sky.exr"));
     ASSERT_TRUE(environment) << environment.error().message();
@@ -53,9 +56,11 @@ TEST_F(EnvironmentFile, WhatIsNoEnvironmentIsRefusedByName) {
         const Expected<Environment> environment = load_environment(path(name));
         return environment ? std::string("accepted") : environment.error().message();
     };
-    EXPECT_THAT(error("sky.png"), testing::AllOf(HasSubstr("load environment"), HasSubstr("sky.png"), HasSubstr("PNG")));
+    EXPECT_THAT(error("sky.png"),
+                testing::AllOf(HasSubstr("load environment"), HasSubstr("sky.png"), HasSubstr("PNG")));
     EXPECT_THAT(error("missing.hdr"), HasSubstr("missing.hdr"));
-    ASSERT_TRUE(write_file_atomically(path("cut.hdr"), std::string_view("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n\x02")));
+    ASSERT_TRUE(write_file_atomically(path("cut.hdr"),
+                                      std::string_view("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n\x02")));
     EXPECT_THAT(error("cut.hdr"), HasSubstr("cut.hdr"));
     ASSERT_TRUE(write_file_atomically(
         path("bomb.hdr"), std::string_view("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1000000 +X 1000000\n\x02")));

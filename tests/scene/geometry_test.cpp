@@ -62,8 +62,8 @@ TEST(Geometry, ComponentTypesAreConverted) {
     file.json["accessors"].back()["count"] = 3;
     attributes["TEXCOORD_0"] = file.add_accessor<std::uint8_t>({0, 255, 51, 0, 255, 102}, "VEC2", true);
     attributes["TEXCOORD_1"] = file.add_accessor<std::int16_t>({32767, -32767, -32768, 0, 0, 16384}, "VEC2", true);
-    attributes["COLOR_0"] = file.add_accessor<std::uint16_t>({65535, 0, 0, 65535, 0, 65535, 0, 0, 13107, 0, 0, 65535},
-                                                             "VEC4", true);
+    attributes["COLOR_0"] =
+        file.add_accessor<std::uint16_t>({65535, 0, 0, 65535, 0, 65535, 0, 0, 13107, 0, 0, 65535}, "VEC4", true);
     const Primitive primitive = only_primitive(file);
     EXPECT_THAT(primitive.positions, ElementsAre(glm::vec3(0, 0, -7), glm::vec3(300, 0, 0), glm::vec3(0, 300, -7)));
     EXPECT_THAT(primitive.uv0, ElementsAre(glm::vec2(0, 1), glm::vec2(0.2f, 0), glm::vec2(1, 0.4f)));
@@ -184,7 +184,8 @@ TEST(Geometry, VerticesThatNothingDrawsAreDropped) {
                                       {"NORMAL", file.add_accessor(normals, "VEC3")}};
     file.primitive()["indices"] = file.add_accessor<std::uint16_t>({90, 92, 91}, "SCALAR");
     const Primitive primitive = only_primitive(file);
-    EXPECT_THAT(primitive.positions, ElementsAre(glm::vec3(90, 8100, 0), glm::vec3(91, 8281, 0), glm::vec3(92, 8464, 0)));
+    EXPECT_THAT(primitive.positions,
+                ElementsAre(glm::vec3(90, 8100, 0), glm::vec3(91, 8281, 0), glm::vec3(92, 8464, 0)));
     EXPECT_THAT(primitive.indices, ElementsAre(0, 2, 1));
     EXPECT_EQ(primitive.normals.size(), 3u);
 }
@@ -249,16 +250,18 @@ TEST(Geometry, BrokenAttributesAreMendedAndCounted) {
 
 TEST(Geometry, TheLargestCoordinatesStayFinite) {
     GltfBuilder file;
-    file.primitive()["attributes"]["POSITION"] = file.add_accessor<float>({-3e38f, 0, 0, 3e38f, 0, 0, 0, 3e38f, 0}, "VEC3");
+    file.primitive()["attributes"]["POSITION"] =
+        file.add_accessor<float>({-3e38f, 0, 0, 3e38f, 0, 0, 0, 3e38f, 0}, "VEC3");
     const Primitive primitive = only_primitive(file);  // checks normals and the camera
     EXPECT_EQ(primitive.normals[0], glm::vec3(0, 0, 1));
 }
 
 TEST(Geometry, EmptyScenesAreValid) {
-    for (const char* text : {R"({"asset":{"version":"2.0"}})", R"({"asset":{"version":"2.0"},"scenes":[{}]})",
-                             R"({"asset":{"version":"2.0"},"nodes":[{}],"meshes":[]})",
-                             R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[]}]})",
-                             R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{}}]}]})"}) {
+    for (const char* text :
+         {R"({"asset":{"version":"2.0"}})", R"({"asset":{"version":"2.0"},"scenes":[{}]})",
+          R"({"asset":{"version":"2.0"},"nodes":[{}],"meshes":[]})",
+          R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[]}]})",
+          R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{}}]}]})"}) {
         const Expected<Scene> scene = load_text(text);
         ASSERT_TRUE(scene) << scene.error().message();
         expect_valid_scene(*scene);

@@ -63,14 +63,17 @@ class GltfBuilder {
         const std::size_t offset = data.size();
         data.resize(offset + values.size() * sizeof(T));
         std::memcpy(data.data() + offset, values.data(), values.size() * sizeof(T));
-        json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", offset}, {"byteLength", values.size() * sizeof(T)}});
+        json["bufferViews"].push_back(
+            {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", values.size() * sizeof(T)}});
         return static_cast<int>(json["bufferViews"].size() - 1);
     }
 
     /// Appends values as an accessor with a bufferView of its own and returns its index.
     template <typename T>
     int add_accessor(const std::vector<T>& values, const std::string& type, bool normalized = false) {
-        const std::size_t components = type == "SCALAR" ? 1 : type == "MAT4" ? 16 : static_cast<std::size_t>(type[3] - '0');
+        const std::size_t components = type == "SCALAR" ? 1
+                                       : type == "MAT4" ? 16
+                                                        : static_cast<std::size_t>(type[3] - '0');
         nlohmann::json accessor = {{"bufferView", add_view(values)},
                                    {"componentType", component_type<T>()},
                                    {"count", values.size() / components},
@@ -94,8 +97,8 @@ class GltfBuilder {
     [[nodiscard]] std::string text() const {
         nlohmann::json complete = json;
         if (!complete.contains("buffers")) {
-            complete["buffers"] = {{{"byteLength", data.size()},
-                                    {"uri", "data:application/octet-stream;base64," + encode_base64(data)}}};
+            complete["buffers"] = {
+                {{"byteLength", data.size()}, {"uri", "data:application/octet-stream;base64," + encode_base64(data)}}};
         }
         return complete.dump();
     }

@@ -12,9 +12,7 @@
 /// @file
 /// libFuzzer target for the importer: any bytes must give a scene whose promises hold, or an error that says something.
 ///
-///     cmake --preset fuzz && ninja -C build-fuzz gltf_fuzzer
-///     tests/scene/make_fuzzer_seeds.py ASSETS build-fuzz/seeds && mkdir -p build-fuzz/corpus
-///     build-fuzz/bin/gltf_fuzzer -dict=tests/scene/gltf_fuzzer.dict -max_len=100000 build-fuzz/corpus build-fuzz/seeds
+///     ./run fuzz        # all fuzz targets, with the seeds in tests/seeds and those made of the sample scenes
 
 namespace {
 
@@ -39,7 +37,8 @@ void check_promises(const Scene& scene) {
             require(primitive.uv0.empty() || primitive.uv0.size() == count);
             require(primitive.uv1.empty() || primitive.uv1.size() == count);
             require(primitive.colors.empty() || primitive.colors.size() == count);
-            for (const auto& p : primitive.positions) require(p.x - p.x == 0.0f && p.y - p.y == 0.0f && p.z - p.z == 0.0f);
+            for (const auto& p : primitive.positions)
+                require(p.x - p.x == 0.0f && p.y - p.y == 0.0f && p.z - p.z == 0.0f);
             for (const auto& n : primitive.normals) {
                 const float squared = n.x * n.x + n.y * n.y + n.z * n.z;
                 require(squared > 0.99f && squared < 1.01f);

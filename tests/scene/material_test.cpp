@@ -157,7 +157,8 @@ TEST(Material, ExtensionsThatAreAbsentStayAbsentAndEmptyOnesHaveTheirDefaults) {
     const auto& a = absent.materials.at(0);
     EXPECT_FALSE(a.clearcoat || a.sheen || a.anisotropy || a.transmission || a.volume || a.specular || a.iridescence ||
                  a.diffuse_transmission || a.specular_glossiness || a.unlit);
-    const Scene empty = load_valid(file_with(R"({"extensions": {"KHR_materials_specular": {}, "KHR_materials_volume": {},
+    const Scene empty =
+        load_valid(file_with(R"({"extensions": {"KHR_materials_specular": {}, "KHR_materials_volume": {},
         "KHR_materials_iridescence": {}}})"));
     const auto& e = empty.materials.at(0);
     EXPECT_EQ(e.specular->factor, 1.0f);
@@ -168,7 +169,8 @@ TEST(Material, ExtensionsThatAreAbsentStayAbsentAndEmptyOnesHaveTheirDefaults) {
 }
 
 TEST(Material, TextureTransformsAreKeptAndMayChooseTheCoordinates) {
-    const Scene scene = load_valid(file_with(R"({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 0,
+    const Scene scene =
+        load_valid(file_with(R"({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 0,
         "extensions": {"KHR_texture_transform": {"offset": [0.1, 0.2], "rotation": 0.3, "scale": [4, 5], "texCoord": 1}}}}})"));
     const auto& texture = scene.materials.at(0).base_color_texture;
     EXPECT_EQ(texture.transform.offset, glm::vec2(0.1f, 0.2f));
@@ -178,7 +180,8 @@ TEST(Material, TextureTransformsAreKeptAndMayChooseTheCoordinates) {
 }
 
 TEST(Material, HighSetsOfTextureCoordinatesTakeTheTwoPlaces) {
-    const Scene scene = load_valid(file_with(R"({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 3}},
+    const Scene scene =
+        load_valid(file_with(R"({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 3}},
         "emissiveTexture": {"index": 1, "texCoord": 1}})"));
     EXPECT_EQ(scene.materials.at(0).base_color_texture.uv_set, 1);
     EXPECT_EQ(scene.materials.at(0).emissive_texture.uv_set, 0);
@@ -186,7 +189,8 @@ TEST(Material, HighSetsOfTextureCoordinatesTakeTheTwoPlaces) {
     EXPECT_EQ(scene.meshes.at(0).primitives.at(0).uv1.at(0).x, 3.0f);
     EXPECT_TRUE(scene.warnings.empty());
 
-    const Scene three = load_valid(file_with(R"({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 3}},
+    const Scene three =
+        load_valid(file_with(R"({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 3}},
         "emissiveTexture": {"index": 1, "texCoord": 1}, "normalTexture": {"index": 2}})"));
     EXPECT_THAT(three.warnings, ElementsAre(HasSubstr("TEXCOORD_3")));
 }
@@ -216,12 +220,16 @@ TEST(Material, PicturesAreReadFromBufferViewsAndAlphaIsFound) {
 }
 
 TEST(Material, SamplersAreTranslated) {
-    GltfBuilder file = file_with(R"({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}, "emissiveTexture": {"index": 1}})");
+    GltfBuilder file =
+        file_with(R"({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}, "emissiveTexture": {"index": 1}})");
     file.json["samplers"] = {{{"magFilter", 9728}, {"minFilter", 9985}, {"wrapS", 33071}, {"wrapT", 33648}}};
     file.json["textures"][0]["sampler"] = 0;
     const Scene scene = load_valid(file);
-    const Sampler expected{.magnification = Filter::nearest, .minification = Filter::linear, .mip = MipFilter::nearest,
-                           .wrap_u = Wrap::clamp_to_edge, .wrap_v = Wrap::mirrored_repeat};
+    const Sampler expected{.magnification = Filter::nearest,
+                           .minification = Filter::linear,
+                           .mip = MipFilter::nearest,
+                           .wrap_u = Wrap::clamp_to_edge,
+                           .wrap_v = Wrap::mirrored_repeat};
     EXPECT_EQ(scene.samplers.at(scene.materials[0].base_color_texture.sampler), expected);
     EXPECT_EQ(scene.samplers.at(scene.materials[0].emissive_texture.sampler), Sampler{});
 }
@@ -245,8 +253,9 @@ TEST(Material, TexturesWithoutAReadablePictureAreLeftOutWithAWarning) {
 
 TEST(Material, TangentsAppearWhereTheMaterialNeedsThem) {
     EXPECT_TRUE(load_valid(file_with("{}")).meshes.at(0).primitives.at(0).tangents.empty());
-    for (const char* material : {R"({"normalTexture": {"index": 0}})", R"({"extensions": {"KHR_materials_anisotropy": {}}})",
-                                 R"({"extensions": {"KHR_materials_clearcoat": {"clearcoatNormalTexture": {"index": 0}}}})"}) {
+    for (const char* material :
+         {R"({"normalTexture": {"index": 0}})", R"({"extensions": {"KHR_materials_anisotropy": {}}})",
+          R"({"extensions": {"KHR_materials_clearcoat": {"clearcoatNormalTexture": {"index": 0}}}})"}) {
         EXPECT_FALSE(load_valid(file_with(material)).meshes.at(0).primitives.at(0).tangents.empty()) << material;
     }
 }

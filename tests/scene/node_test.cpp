@@ -67,14 +67,16 @@ TEST(Nodes, OnlyTheDefaultSceneIsPlacedAndSharedMeshesStayShared) {
 TEST(Nodes, ATenThousandDeepTreeIsPlaced) {
     GltfBuilder file;
     file.json["nodes"] = nlohmann::json::array();
-    for (int i = 0; i < 10'000; ++i) file.json["nodes"].push_back({{"children", {i + 1}}, {"translation", {0.001, 0, 0}}});
+    for (int i = 0; i < 10'000; ++i)
+        file.json["nodes"].push_back({{"children", {i + 1}}, {"translation", {0.001, 0, 0}}});
     file.json["nodes"].push_back({{"mesh", 0}});
     expect_near(moved(load_valid(file), {0, 0, 0}), {10, 0, 0}, 1e-4f);
 }
 
 TEST(Nodes, ATransformBeyondFloatDropsWhatItHolds) {
     GltfBuilder file;
-    file.json["nodes"] = nlohmann::json::parse(R"([{"children": [1], "scale": [1e38, 1, 1]}, {"mesh": 0, "scale": [1e38, 1, 1]}])");
+    file.json["nodes"] =
+        nlohmann::json::parse(R"([{"children": [1], "scale": [1e38, 1, 1]}, {"mesh": 0, "scale": [1e38, 1, 1]}])");
     const Scene scene = load_valid(file);
     EXPECT_TRUE(scene.instances.empty());
     ASSERT_EQ(scene.warnings.size(), 1u);
@@ -87,8 +89,9 @@ GltfBuilder animated(const char* path, const char* interpolation, const std::vec
     GltfBuilder file;
     const int input = file.add_accessor(times, "SCALAR");
     const int output = file.add_accessor(values, type);
-    file.json["animations"] = {{{"samplers", {{{"input", input}, {"output", output}, {"interpolation", interpolation}}}},
-                                {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", path}}}}}}}};
+    file.json["animations"] = {
+        {{"samplers", {{{"input", input}, {"output", output}, {"interpolation", interpolation}}}},
+         {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", path}}}}}}}};
     return file;
 }
 
@@ -117,7 +120,8 @@ TEST(Animation, StepsHoldTheirValue) {
 
 TEST(Animation, RotationsTakeTheShortWay) {
     // From 0 to 90 degrees around z, the second written as -q: the same rotation.
-    const GltfBuilder file = animated("rotation", "LINEAR", {0, 1}, {0, 0, 0, 1, 0, 0, -0.70710678f, -0.70710678f}, "VEC4");
+    const GltfBuilder file =
+        animated("rotation", "LINEAR", {0, 1}, {0, 0, 0, 1, 0, 0, -0.70710678f, -0.70710678f}, "VEC4");
     const float third = pi / 6.0f;
     expect_near(moved(load_valid(file, {.time = 1.0f / 3.0f}), {1, 0, 0}), {std::cos(third), std::sin(third), 0});
 }
@@ -171,7 +175,8 @@ TEST(Morph, NormalsMoveTooAndStayUnit) {
 
 TEST(Morph, NodesWithDifferentWeightsHaveDifferentMeshes) {
     GltfBuilder file = morphed();
-    file.json["nodes"] = nlohmann::json::parse(R"([{"mesh": 0}, {"mesh": 0, "weights": [1, 0]}, {"mesh": 0, "weights": [1, 0]}])");
+    file.json["nodes"] =
+        nlohmann::json::parse(R"([{"mesh": 0}, {"mesh": 0, "weights": [1, 0]}, {"mesh": 0, "weights": [1, 0]}])");
     file.json["scenes"][0]["nodes"] = {0, 1, 2};
     const Scene scene = load_valid(file);
     EXPECT_EQ(scene.meshes.size(), 2u);
@@ -275,7 +280,8 @@ TEST(Lights, AllThreeKindsAreReadWithTheirUnitsAndPlaces) {
         {"type": "spot", "spot": {"innerConeAngle": 2, "outerConeAngle": 1}, "intensity": -1}])");
     file.json["nodes"] = nlohmann::json::array();
     for (int i = 0; i < 4; ++i) {
-        nlohmann::json node = {{"translation", {i, 0, 0}}, {"rotation", {-0.70710678, 0, 0, 0.70710678}}, {"scale", {5, 5, 5}}};
+        nlohmann::json node = {
+            {"translation", {i, 0, 0}}, {"rotation", {-0.70710678, 0, 0, 0.70710678}}, {"scale", {5, 5, 5}}};
         node["extensions"]["KHR_lights_punctual"]["light"] = i;
         file.json["nodes"].push_back(node);
     }

@@ -124,7 +124,8 @@ std::multimap<std::array<float, 8>, glm::vec4> tangents_by_corner(const Primitiv
     std::multimap<std::array<float, 8>, glm::vec4> result;
     for (const std::uint32_t i : p.indices) {
         result.insert({{p.positions[i].x, p.positions[i].y, p.positions[i].z, p.normals[i].x, p.normals[i].y,
-                        p.normals[i].z, p.uv0[i].x, p.uv0[i].y}, p.tangents[i]});
+                        p.normals[i].z, p.uv0[i].x, p.uv0[i].y},
+                       p.tangents[i]});
     }
     return result;
 }
