@@ -40,6 +40,7 @@ struct Capabilities {
     bool float_color_targets = false;   ///< 16-bit float formats as color targets, with blending.
     bool ray_query = false;             ///< GL_EXT_ray_query.
     bool base_instance = false;         ///< DrawArguments::first_instance other than 0 in direct draws.
+    bool texture_views = false;         ///< A sampled view may show some layers, or another dimension, of its texture.
     bool texture_view_formats = false;  ///< A view may reinterpret its texture's format (same size).
     bool fill_storage_without_format = false;  ///< imageStore to images declared without a format.
 

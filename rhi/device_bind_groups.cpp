@@ -179,6 +179,14 @@ Check GroupBuilder::add_texture(const BindGroupEntry& entry, const BindingLayout
     if (Check failed = check_view(view, texture, capabilities, "create bind group",
                                   fmt::format("'{}', binding {}", desc_.name, entry.binding)))
         return failed;
+    const ViewReference own = complete_view(TextureView(entry.texture.texture), texture);
+    if (!image && !capabilities.texture_views && (view.dimension != own.dimension || view.layer_count != own.layer_count))
+        return problem(Rule::view_dimension, entry.binding,
+                       fmt::format("expected all {} layers of texture '{}' as {} on a device without texture_views, found {} "
+                                   "layers as {}",
+                                   own.layer_count, texture.name, name_of(own.dimension), view.layer_count,
+                                   name_of(view.dimension)),
+                       "Sample the whole texture, and choose the layer in the shader.");
     if (image && (view.mip_count != 1 || texture.samples != 1))
         return problem(Rule::group_storage_view, entry.binding,
                        fmt::format("expected one mip of a texture of 1 sample, found {} mips of '{}' with {} samples",

@@ -80,6 +80,7 @@ rhi::Capabilities find_capabilities(const Functions& gl, const Traits& traits) {
     result.block_compression = traits.s3tc_srgb && traits.rgtc && traits.bptc;
     result.float_color_targets = traits.float_targets;
     result.base_instance = traits.base_instance;
+    result.texture_views = traits.texture_view;
     result.texture_view_formats = traits.texture_view;
     result.fill_storage_without_format = traits.desktop;
 

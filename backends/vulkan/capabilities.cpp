@@ -163,6 +163,7 @@ rhi::Capabilities capabilities_of(const Instance& instance, const PhysicalDevice
     result.sample_rate_shading = features.sampleRateShading;
     result.block_compression = features.textureCompressionBC;
     result.base_instance = true;
+    result.texture_views = true;
     result.texture_view_formats = true;
     result.fill_storage_without_format = features.shaderStorageImageWriteWithoutFormat;
 

@@ -235,4 +235,43 @@ void BackendTest::run(CommandList list) {
     ok(device().wait(fence));
 }
 
+void BackendTest::dispatch(ComputePipeline pipeline, const std::vector<BindGroupEntry>& entries,
+                           DispatchArguments groups) {
+    CommandList list = device().create_command_list("dispatch");
+    list.set_pipeline(pipeline);
+    if (!entries.empty()) list.set_bind_group(0, group(pipeline, entries));
+    list.dispatch(groups);
+    run(std::move(list));
+}
+
+GraphicsPipelineDesc BackendTest::fullscreen_desc(const std::string& fragment, std::vector<ColorTargetState> targets) {
+    GraphicsPipelineDesc desc;
+    desc.vertex = shader(ShaderStage::vertex, fullscreen_vertex, "fullscreen");
+    desc.fragment = shader(ShaderStage::fragment, fragment);
+    desc.color_targets = std::move(targets);
+    desc.name = "fullscreen";
+    return desc;
+}
+
+GraphicsPipeline BackendTest::fullscreen(const std::string& fragment, Format target) {
+    return ok(device().create_graphics_pipeline(fullscreen_desc(fragment, {{.format = target}})));
+}
+
+void BackendTest::cover(Texture target, const std::string& fragment, const std::vector<BindGroupEntry>& entries) {
+    const GraphicsPipeline pipeline = fullscreen(fragment, ok(device().describe(target)).format);
+    CommandList list = device().create_command_list("cover");
+    list.begin_render_pass({.color = {{.view = target, .load = LoadOperation::discard}}, .name = "cover"});
+    list.set_pipeline(pipeline);
+    if (!entries.empty()) list.set_bind_group(0, group(pipeline, entries));
+    list.draw({.vertex_count = 3});
+    list.end_render_pass();
+    run(std::move(list));
+}
+
+Sampler BackendTest::nearest() {
+    return sampler({.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest,
+                    .address_u = AddressMode::clamp_to_edge, .address_v = AddressMode::clamp_to_edge,
+                    .address_w = AddressMode::clamp_to_edge, .name = "nearest"});
+}
+
 }  // namespace nacre::test

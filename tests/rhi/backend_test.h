@@ -113,6 +113,45 @@ class BackendTest : public ::testing::TestWithParam<Variant> {
     /// Submits, and waits until it is done.
     void run(rhi::CommandList list);
 
+    /// Bind group for an index of a pipeline.
+    template <typename Pipeline>
+    rhi::BindGroup group(Pipeline pipeline, std::vector<rhi::BindGroupEntry> entries, std::uint32_t index = 0) {
+        return ok(device().create_bind_group({.layout = ok(device().bind_group_layout(pipeline, index)),
+                                              .entries = std::move(entries),
+                                              .name = "group"}));
+    }
+    /// Runs a compute shader that writes `count` values into `buffer Result` at binding 0 of set 0, and reads them.
+    template <typename T>
+    std::vector<T> evaluate(const std::string& body, std::size_t count, std::vector<rhi::BindGroupEntry> entries = {},
+                            rhi::DispatchArguments groups = {1, 1, 1}) {
+        const rhi::Buffer result = buffer(count * sizeof(T), rhi::BufferUsage::storage, "result");
+        entries.push_back({.binding = 0, .buffer = result});
+        dispatch(compute(body), entries, groups);
+        return read<T>(result);
+    }
+    void dispatch(rhi::ComputePipeline pipeline, const std::vector<rhi::BindGroupEntry>& entries,
+                  rhi::DispatchArguments groups = {1, 1, 1});
+
+    /// A pipeline that covers a target with one triangle; `fragment` reads `uv` at location 0.
+    rhi::GraphicsPipelineDesc fullscreen_desc(const std::string& fragment, std::vector<rhi::ColorTargetState> targets);
+    rhi::GraphicsPipeline fullscreen(const std::string& fragment, rhi::Format target);
+    /// Covers a target with the result of a fragment shader.
+    void cover(rhi::Texture target, const std::string& fragment, const std::vector<rhi::BindGroupEntry>& entries = {});
+
+    /// A 2D texture with content in mip 0; sampled, copied and written.
+    template <typename T>
+    rhi::Texture texture_of(rhi::Format format, std::uint32_t width, std::uint32_t height, std::span<const T> texels,
+                            std::string name = "texture") {
+        const rhi::Texture made = ok(device().create_texture(
+            {.format = format, .width = width, .height = height,
+             .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::copy_destination | rhi::TextureUsage::copy_source,
+             .name = std::move(name)}));
+        ok(device().write_texture(made, std::as_bytes(texels)));
+        return made;
+    }
+    rhi::Sampler nearest();
+    rhi::Sampler sampler(const rhi::SamplerDesc& desc) { return ok(device().create_sampler(desc)); }
+
   private:
     [[noreturn]] static void throw_failure(const Error& error);
     void listen(rhi::Device& device);
