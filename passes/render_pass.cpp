@@ -11,19 +11,6 @@ namespace nacre::passes {
 
 using rhi::ResourceUse;
 
-namespace {
-
-rhi::Topology topology_of(scene::Topology topology) {
-    switch (topology) {
-        case scene::Topology::point_list: return rhi::Topology::point_list;
-        case scene::Topology::line_list: return rhi::Topology::line_list;
-        case scene::Topology::triangle_list: break;
-    }
-    return rhi::Topology::triangle_list;
-}
-
-}  // namespace
-
 Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPassDesc& desc,
                                       std::vector<std::uint32_t> draws, bool keep_order) {
     device_ = &context.device;
@@ -34,7 +21,6 @@ Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPass
     // What a pipeline depends on. Materials whose sets of textures differ have different layouts.
     struct Key {
         ShadingFeatures features;
-        scene::Topology topology;
         rhi::CullMode cull;
         bool mirrored;
         std::uint32_t texture_mask;
@@ -56,7 +42,6 @@ Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPass
             pipeline.bind_group_layouts.push_back(context.materials.layout(draw.material));
         }
         SceneGeometry::describe_vertices(key.features.attributes, pipeline);
-        pipeline.topology = topology_of(key.topology);
         pipeline.cull = key.cull;
         pipeline.front_face = key.mirrored ? rhi::FrontFace::clockwise : rhi::FrontFace::counter_clockwise;
         pipeline.depth_stencil = desc.depth_stencil;
@@ -72,7 +57,7 @@ Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPass
         ShadingFeatures features = restricted(draw.features, desc.textures, desc.with_normals, desc.with_colors);
         if (!desc.keeps_unlit) features.unlit = false;
         const bool culls = desc.culls && !draw.two_faces;
-        Key key{features, draw.topology, culls ? rhi::CullMode::back : rhi::CullMode::none,
+        Key key{features, culls ? rhi::CullMode::back : rhi::CullMode::none,
                 (culls || features.double_sided) && draw.mirrored,
                 uses_materials_ ? context.materials.texture_mask(draw.material) : 0};
         Item item{.draw = index, .attributes = features.attributes};

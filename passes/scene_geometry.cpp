@@ -11,12 +11,13 @@
 namespace nacre::passes {
 namespace {
 
-constexpr std::array<std::uint32_t, attribute_count> attribute_bytes = {12, 12, 16, 8, 8, 16};
+constexpr std::array<std::uint32_t, attribute_count> attribute_bytes = {12, 12, 16, 8, 8, 16, 16};
 constexpr std::array<rhi::Format, attribute_count> attribute_formats = {
     rhi::Format::rgb32_float, rhi::Format::rgb32_float, rhi::Format::rgba32_float,
-    rhi::Format::rg32_float,  rhi::Format::rg32_float,  rhi::Format::rgba32_float};
+    rhi::Format::rg32_float,  rhi::Format::rg32_float,  rhi::Format::rgba32_float, rhi::Format::rgba32_float};
+constexpr std::array<std::uint32_t, attribute_count> attribute_locations = {0, 1, 2, 3, 4, 5, 9};
 constexpr std::array<const char*, attribute_count> attribute_names = {"positions", "normals", "tangents",
-                                                                      "uv0",       "uv1",     "colors"};
+                                                                      "uv0",       "uv1",     "colors",  "corners"};
 constexpr std::uint32_t instance_bytes = 48;
 
 std::span<const std::byte> attribute_content(const scene::Primitive& primitive, Attribute attribute) {
@@ -26,9 +27,52 @@ std::span<const std::byte> attribute_content(const scene::Primitive& primitive, 
         case Attribute::tangent: return std::as_bytes(std::span(primitive.tangents));
         case Attribute::uv0: return std::as_bytes(std::span(primitive.uv0));
         case Attribute::uv1: return std::as_bytes(std::span(primitive.uv1));
-        case Attribute::color: break;
+        case Attribute::color: return std::as_bytes(std::span(primitive.colors));
+        case Attribute::corner: break;
     }
-    return std::as_bytes(std::span(primitive.colors));
+    return {};
+}
+
+/// Points and lines as two triangles each, one pixel wide: each vertex is there once for each corner of its rectangle.
+struct Rectangles {
+    scene::Primitive primitive;
+    std::vector<glm::vec4> corners;
+};
+
+Rectangles rectangles_of(const scene::Primitive& thin) {
+    Rectangles result;
+    scene::Primitive& made = result.primitive;
+    made.material = thin.material;
+    made.bounds = thin.bounds;
+    const auto copy = [](auto& to, const auto& from, std::uint32_t vertex) {
+        if (!from.empty()) to.push_back(from[vertex]);
+    };
+    const auto add = [&](std::uint32_t vertex, const glm::vec3& other, float code) {
+        copy(made.positions, thin.positions, vertex);
+        copy(made.normals, thin.normals, vertex);
+        copy(made.tangents, thin.tangents, vertex);
+        copy(made.uv0, thin.uv0, vertex);
+        copy(made.uv1, thin.uv1, vertex);
+        copy(made.colors, thin.colors, vertex);
+        result.corners.emplace_back(other, code);
+    };
+    const bool points = thin.topology == scene::Topology::point_list;
+    for (std::size_t i = 0; i + (points ? 0 : 1) < thin.indices.size(); i += points ? 1 : 2) {
+        const auto first = static_cast<std::uint32_t>(made.positions.size());
+        const std::uint32_t a = thin.indices[i];
+        if (points) {
+            for (int corner = 0; corner < 4; ++corner) add(a, thin.positions[a], static_cast<float>(corner));
+        } else {
+            // Seen from the other end, left and right change places.
+            const std::uint32_t b = thin.indices[i + 1];
+            add(a, thin.positions[b], 1.0f);
+            add(a, thin.positions[b], -1.0f);
+            add(b, thin.positions[a], -1.0f);
+            add(b, thin.positions[a], 1.0f);
+        }
+        for (const std::uint32_t corner : {0u, 1u, 2u, 2u, 1u, 3u}) made.indices.push_back(first + corner);
+    }
+    return result;
 }
 
 void append(std::vector<std::byte>& to, std::span<const std::byte> bytes) { to.insert(to.end(), bytes.begin(), bytes.end()); }
@@ -72,12 +116,17 @@ Expected<std::unique_ptr<SceneGeometry>> SceneGeometry::create(rhi::Device& devi
                 draw.two_faces = slab.double_sided || primitive.topology != scene::Topology::triangle_list;
                 draw.alpha_mode = slab.alpha_mode;
                 draw.index_offset = indices.size();
-                draw.index_count = static_cast<std::uint32_t>(primitive.indices.size());
-                append(indices, std::as_bytes(std::span(primitive.indices)));
+                Rectangles rectangles;
+                if (draw.features.thin) rectangles = rectangles_of(primitive);
+                const scene::Primitive& drawn = draw.features.thin ? rectangles.primitive : primitive;
+                draw.index_count = static_cast<std::uint32_t>(drawn.indices.size());
+                append(indices, std::as_bytes(std::span(drawn.indices)));
                 for (std::uint32_t a = 0; a < attribute_count; ++a) {
                     if ((draw.features.attributes & (1u << a)) == 0) continue;
                     draw.attribute_offsets[a] = attributes[a].size();
-                    append(attributes[a], attribute_content(primitive, static_cast<Attribute>(a)));
+                    append(attributes[a], static_cast<Attribute>(a) == Attribute::corner
+                                              ? std::as_bytes(std::span(rectangles.corners))
+                                              : attribute_content(drawn, static_cast<Attribute>(a)));
                 }
             }
             // Mirrored places need the other winding; blended ones are sorted one by one.
@@ -167,7 +216,7 @@ void SceneGeometry::describe_vertices(std::uint32_t attributes, rhi::GraphicsPip
     for (std::uint32_t a = 0; a < attribute_count; ++a) {
         if ((attributes & (1u << a)) == 0) continue;
         pipeline.vertex_buffers.push_back({.stride = attribute_bytes[a]});
-        pipeline.vertex_attributes.push_back({.location = a, .buffer = slot++, .offset = 0, .format = attribute_formats[a]});
+        pipeline.vertex_attributes.push_back({.location = attribute_locations[a], .buffer = slot++, .offset = 0, .format = attribute_formats[a]});
     }
     pipeline.vertex_buffers.push_back({.stride = instance_bytes, .per_instance = true});
     for (std::uint32_t row = 0; row < 3; ++row) {

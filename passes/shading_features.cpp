@@ -10,13 +10,14 @@ constexpr std::array<const char*, texture_slot_count> slot_defines = {
     "BASE_COLOR_TEXTURE", "METALLIC_ROUGHNESS_TEXTURE", "NORMAL_TEXTURE",        "OCCLUSION_TEXTURE",
     "EMISSION_TEXTURE",   "SPECULAR_TEXTURE",           "SPECULAR_COLOR_TEXTURE"};
 constexpr std::array<const char*, attribute_count> attribute_defines = {"",        "HAS_NORMALS", "HAS_TANGENTS",
-                                                                        "HAS_UV0", "HAS_UV1",     "HAS_COLORS"};
+                                                                        "HAS_UV0", "HAS_UV1",     "HAS_COLORS",
+                                                                        ""};
 
 bool any_component(const glm::vec3& v) { return v.x != 0.0f || v.y != 0.0f || v.z != 0.0f; }
 
 void add_attribute_defines(std::vector<rhi::ShaderDefine>& defines, std::uint32_t attributes) {
     for (std::uint32_t i = 1; i < attribute_count; ++i) {
-        if ((attributes & (1u << i)) != 0) defines.push_back({attribute_defines[i]});
+        if ((attributes & (1u << i)) != 0 && attribute_defines[i][0] != 0) defines.push_back({attribute_defines[i]});
     }
 }
 
@@ -53,8 +54,10 @@ ShadingFeatures features_of(const materials::SingleSlab& slab, const scene::Prim
     features.unlit = slab.unlit || primitive.normals.empty();
     features.double_sided = slab.double_sided && !features.unlit;
     features.points = primitive.topology == scene::Topology::point_list;
+    features.thin = primitive.topology != scene::Topology::triangle_list;
     features.emits = any_component(slab.emission) && !slab.unlit;
     if (!features.unlit) features.attributes |= attribute_bit(Attribute::normal);
+    if (features.thin) features.attributes |= attribute_bit(Attribute::corner);
     if (!primitive.colors.empty()) features.attributes |= attribute_bit(Attribute::color);
 
     for (std::uint32_t i = 0; i < texture_slot_count; ++i) {
@@ -90,6 +93,7 @@ std::vector<rhi::ShaderDefine> vertex_defines(const ShadingFeatures& features) {
     std::vector<rhi::ShaderDefine> defines;
     add_attribute_defines(defines, features.attributes);
     if (features.points) defines.push_back({"POINTS"});
+    if (features.thin) defines.push_back({"THIN"});
     return defines;
 }
 

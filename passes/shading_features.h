@@ -24,9 +24,9 @@ enum class TextureSlot : std::uint32_t {
 };
 inline constexpr std::uint32_t texture_slot_count = 7;
 
-/// Vertex attributes, in the order of their locations.
-enum class Attribute : std::uint32_t { position, normal, tangent, uv0, uv1, color };
-inline constexpr std::uint32_t attribute_count = 6;
+/// Vertex attributes. Locations are 0 to 5, and 9 for `corner` (points and lines drawn as rectangles).
+enum class Attribute : std::uint32_t { position, normal, tangent, uv0, uv1, color, corner };
+inline constexpr std::uint32_t attribute_count = 7;
 
 constexpr std::uint32_t texture_bit(TextureSlot slot) { return 1u << static_cast<std::uint32_t>(slot); }
 constexpr std::uint32_t attribute_bit(Attribute attribute) { return 1u << static_cast<std::uint32_t>(attribute); }
@@ -41,6 +41,7 @@ struct ShadingFeatures {
     bool unlit = false;
     bool emits = false;
     bool points = false;
+    bool thin = false;             ///< Points or lines.
 
     friend auto operator<=>(const ShadingFeatures&, const ShadingFeatures&) = default;
 };
