@@ -42,6 +42,24 @@ rhi::FormatSupport support_of(const Instance& instance, const PhysicalDevice& de
     return support;
 }
 
+/// Textures that one unbounded array may hold beside what else a pipeline binds.
+std::uint32_t bindless_limit(const PhysicalDevice& device, const VkPhysicalDeviceVulkan12Features& enabled) {
+    const VkPhysicalDeviceLimits& limits = device.properties.limits;
+    const VkPhysicalDeviceVulkan12Properties& later = device.vulkan12;
+    // With update-after-bind the larger of the two sets of limits counts.
+    const std::uint32_t limit =
+        enabled.descriptorBindingSampledImageUpdateAfterBind
+            ? std::min({later.maxPerStageDescriptorUpdateAfterBindSampledImages,
+                        later.maxPerStageDescriptorUpdateAfterBindSamplers,
+                        later.maxDescriptorSetUpdateAfterBindSampledImages,
+                        later.maxDescriptorSetUpdateAfterBindSamplers, later.maxPerStageUpdateAfterBindResources,
+                        later.maxUpdateAfterBindDescriptorsInAllPools})
+            : std::min({limits.maxPerStageDescriptorSampledImages, limits.maxPerStageDescriptorSamplers,
+                        limits.maxPerStageResources});
+    constexpr std::uint32_t for_others = 256, more_than_any_table_needs = 1u << 20;
+    return std::min(limit > 2 * for_others ? limit - for_others : limit / 2, more_than_any_table_needs);
+}
+
 }  // namespace
 
 std::vector<const char*> choose_features(const PhysicalDevice& device, bool dynamic_rendering, bool synchronization2,
@@ -206,16 +224,7 @@ rhi::Capabilities capabilities_of(const Instance& instance, const PhysicalDevice
     result.max_workgroup_invocations = limits.maxComputeWorkGroupInvocations;
     result.max_workgroup_memory_bytes = limits.maxComputeSharedMemorySize;
     result.subgroup_size = result.subgroup_operations ? device.vulkan11.subgroupSize : 0;
-    if (result.descriptor_indexing)
-        // With update-after-bind the larger of the two sets of limits counts; 2^20 is more than any table needs.
-        result.max_bindless_textures =
-            std::min(vulkan12.descriptorBindingSampledImageUpdateAfterBind
-                         ? std::min({device.vulkan12.maxPerStageDescriptorUpdateAfterBindSampledImages,
-                                     device.vulkan12.maxPerStageDescriptorUpdateAfterBindSamplers,
-                                     device.vulkan12.maxDescriptorSetUpdateAfterBindSampledImages,
-                                     device.vulkan12.maxDescriptorSetUpdateAfterBindSamplers})
-                         : std::min(limits.maxPerStageDescriptorSampledImages, limits.maxPerStageDescriptorSamplers),
-                     1u << 20);
+    if (result.descriptor_indexing) result.max_bindless_textures = bindless_limit(device, vulkan12);
     result.max_anisotropy = features.samplerAnisotropy ? limits.maxSamplerAnisotropy : 1.0f;
     result.max_line_width = 1.0f;
     result.max_point_size = features.largePoints ? limits.pointSizeRange[1] : 1.0f;

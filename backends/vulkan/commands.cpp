@@ -38,6 +38,9 @@ Expected<void> Commands::record(const rhi::ExecutionPlan& plan) {
     for (rhi::CommandStream* stream : plan.streams) {
         unset_state();
         stream->for_each([&](const rhi::CommandHeader& header, const std::byte* payload) {
+            // A pass that could not begin must not go on, nor end.
+            if (!status_) [[unlikely]]
+                return;
             if (&header == next) [[unlikely]] {
                 barriers_.record(commands_, plan.barriers.subspan(batch->first, batch->count));
                 ++batch;

@@ -222,6 +222,7 @@ TEST_P(DeviceTest, CountsSamplesAndTime) {
     const QueryPool times = must(gpu().create_query_pool({.type = QueryType::timestamp, .count = 3, .name = "times"}));
     for (int repetition = 0; repetition < 3; ++repetition) {
         CommandList list = gpu().create_command_list("queries");
+        list.push_debug_group("around both passes");
         list.write_timestamp(times, 0);
         for (std::uint32_t pass = 0; pass < 2; ++pass) {
             list.begin_render_pass({.color = {{.view = target, .load = LoadOperation::clear}}});
@@ -239,6 +240,7 @@ TEST_P(DeviceTest, CountsSamplesAndTime) {
             list.end_render_pass();
         }
         list.write_timestamp(times, 2);
+        list.pop_debug_group();
         must(gpu().submit(std::move(list)));
         const auto samples = must(gpu().read_queries(occlusion, 0, 3));
         ASSERT_EQ(samples.size(), 3u);
