@@ -329,7 +329,7 @@ Check check_layout(const BindGroupLayoutDesc& desc, const Capabilities& capabili
                            "expected each binding once, found it twice", "Give each binding its own number.");
         if (binding.binding > 4095)
             return problem(Rule::layout_binding_limit, ErrorCode::invalid_argument, binding,
-                           "expected a number of at most 4095", "Number bindings from 0.");
+                           fmt::format("expected a number of at most 4095, found {}", binding.binding), "Number bindings from 0.");
         if (binding.stages == ShaderStage::none)
             return problem(Rule::layout_stages, ErrorCode::invalid_argument, binding,
                            "expected at least one shader stage, found none", "Set BindingLayout::stages.");
