@@ -88,7 +88,7 @@ Scene spheres_scene() {
     constexpr int columns = 7;  // roughness 0 ... 1
     constexpr int rows = 5;     // metalness 0 ... 1
     Scene scene;
-    const Primitive ball = sphere(0.42f, 96, 48);
+    const Primitive ball = sphere(0.42f, 64, 32);
     for (int row = 0; row < rows; ++row) {
         for (int column = 0; column < columns; ++column) {
             MaterialDescription material = dielectric(
