@@ -106,9 +106,10 @@ void GlGraphicsPipeline::apply(Driver& driver, std::uint32_t stencil_reference) 
     if (traits.polygon_mode) gl.PolygonMode(GL_FRONT_AND_BACK, desc.fill == rhi::FillMode::line ? GL_LINE : GL_FILL);
 
     const rhi::DepthStencilState& state = desc.depth_stencil;
-    set(gl, GL_DEPTH_TEST, state.depth_test);
+    // Depth is written only by fragments that were tested: a pipeline that writes without a test passes them all.
+    set(gl, GL_DEPTH_TEST, state.depth_test || state.depth_write);
     gl.DepthMask(state.depth_write ? GL_TRUE : GL_FALSE);
-    gl.DepthFunc(gl_compare(state.depth_compare));
+    gl.DepthFunc(state.depth_test ? gl_compare(state.depth_compare) : GL_ALWAYS);
     set(gl, GL_STENCIL_TEST, state.stencil_test);
     if (state.stencil_test) {
         for (const auto& [face, side] : {std::pair{GL_FRONT, &state.front}, std::pair{GL_BACK, &state.back}}) {

@@ -144,6 +144,11 @@ std::vector<const char*> choose_features(const PhysicalDevice& device, bool dyna
         chain(enabled.core, enabled.robustness2);
         extensions.push_back(VK_EXT_ROBUSTNESS_2_EXTENSION_NAME);
     }
+    if (device.has_line_rasterization) {
+        enabled.line_rasterization.bresenhamLines = VK_TRUE;
+        chain(enabled.core, enabled.line_rasterization);
+        extensions.push_back(VK_EXT_LINE_RASTERIZATION_EXTENSION_NAME);
+    }
     return extensions;
 }
 

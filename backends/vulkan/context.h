@@ -35,6 +35,7 @@ struct Context {
 
     bool dynamic_rendering = false;  ///< In use, not merely present.
     bool synchronization2 = false;
+    bool bresenham_lines = false;
     bool debug_names = false;
     bool update_after_bind = false;
     /// Store operation of a depth target that is only read. Storing counts as a write, which would collide with the

@@ -68,6 +68,7 @@ Expected<void> Device::create_native(const rhi::DeviceDesc& desc) {
                            context_.vk.CmdEndDebugUtilsLabelEXT;
     if (context_.physical->version() >= VK_API_VERSION_1_3 || context_.dynamic_rendering)
         context_.read_only_store = VK_ATTACHMENT_STORE_OP_NONE;
+    context_.bresenham_lines = enabled.line_rasterization.bresenhamLines;
     context_.update_after_bind = enabled.vulkan12.descriptorBindingSampledImageUpdateAfterBind;
     context_.capabilities = capabilities_of(*context_.instance, *context_.physical, enabled);
     context_.push_constants = {VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT | VK_SHADER_STAGE_COMPUTE_BIT,

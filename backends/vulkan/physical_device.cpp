@@ -84,6 +84,7 @@ Expected<std::vector<std::unique_ptr<PhysicalDevice>>> PhysicalDevice::list(cons
         const bool may_render = core13 || device->has_extension(VK_KHR_DYNAMIC_RENDERING_EXTENSION_NAME);
         const bool may_synchronize = core13 || device->has_extension(VK_KHR_SYNCHRONIZATION_2_EXTENSION_NAME);
         const bool may_be_robust = device->has_extension(VK_EXT_ROBUSTNESS_2_EXTENSION_NAME);
+        const bool may_choose_lines = device->has_extension(VK_EXT_LINE_RASTERIZATION_EXTENSION_NAME);
 
         FeatureChain& features = device->features;
         chain(features.core, features.vulkan11);
@@ -92,10 +93,12 @@ Expected<std::vector<std::unique_ptr<PhysicalDevice>>> PhysicalDevice::list(cons
         if (may_synchronize) chain(features.core, features.synchronization2);
         if (core13) chain(features.core, features.demote);
         if (may_be_robust) chain(features.core, features.robustness2);
+        if (may_choose_lines) chain(features.core, features.line_rasterization);
         instance.vk.GetPhysicalDeviceFeatures2(handle, &features.core);
         device->has_dynamic_rendering = features.dynamic_rendering.dynamicRendering;
         device->has_synchronization2 = features.synchronization2.synchronization2;
         device->has_robustness2 = may_be_robust;
+        device->has_line_rasterization = features.line_rasterization.bresenhamLines;
         if (!features.vulkan12.timelineSemaphore || !features.vulkan12.hostQueryReset) {
             refuse("lacks timeline semaphores or host query reset");
             continue;

@@ -23,6 +23,8 @@ struct FeatureChain {
     VkPhysicalDeviceShaderDemoteToHelperInvocationFeatures demote{
         VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_DEMOTE_TO_HELPER_INVOCATION_FEATURES};
     VkPhysicalDeviceRobustness2FeaturesEXT robustness2{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ROBUSTNESS_2_FEATURES_EXT};
+    VkPhysicalDeviceLineRasterizationFeaturesEXT line_rasterization{
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_LINE_RASTERIZATION_FEATURES_EXT};
 
     FeatureChain() = default;
     FeatureChain(const FeatureChain&) = delete;
@@ -56,6 +58,7 @@ class PhysicalDevice {
     bool has_dynamic_rendering = false;      ///< In core or as extension.
     bool has_synchronization2 = false;
     bool has_robustness2 = false;
+    bool has_line_rasterization = false;
 
   private:
     std::vector<VkExtensionProperties> extensions_;

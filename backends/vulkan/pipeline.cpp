@@ -138,6 +138,12 @@ Expected<std::unique_ptr<rhi::BackendGraphicsPipeline>> GraphicsPipeline::create
     raster.depthBiasSlopeFactor = depth.depth_bias_slope;
     raster.depthBiasClamp = depth.depth_bias_clamp;
     raster.lineWidth = 1.0f;
+    // Lines of one sample cover what OpenGL's lines cover; by default Vulkan draws thin rectangles. The rule cannot be
+    // chosen together with alpha to coverage, and samples ask for rectangles in OpenGL too.
+    VkPipelineRasterizationLineStateCreateInfoEXT lines{
+        VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_LINE_STATE_CREATE_INFO_EXT};
+    lines.lineRasterizationMode = VK_LINE_RASTERIZATION_MODE_BRESENHAM_EXT;
+    if (context.bresenham_lines && desc.samples == 1 && !desc.alpha_to_coverage) raster.pNext = &lines;
 
     VkPipelineMultisampleStateCreateInfo multisample{VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO};
     multisample.rasterizationSamples = static_cast<VkSampleCountFlagBits>(desc.samples);

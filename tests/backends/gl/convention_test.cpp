@@ -297,19 +297,19 @@ void main() { result = uvec4(uvec2(gl_FragCoord.xy), 1, 1); }
 
 TEST_P(GlConventionTest, DrawsTheSameLines) {
     if (!has_device()) return;
-    // Only lines along the axes: Vulkan draws others as thin rectangles, OpenGL by the diamond rule.
     Picture picture{.vertex = position_vertex, .fragment = R"(
 layout(location = 0) in float value;
 layout(location = 0) out uvec4 result;
 void main() { result = uvec4(uvec2(gl_FragCoord.xy), 1, 1); }
 )"};
-    const auto x = [](float pixel) { return pixel / 32.0f - 1.0f; };
-    const auto y = [](float pixel) { return pixel / 24.0f - 1.0f; };
-    picture.vertices = {x(5.25f), y(7.5f), 0, 1, x(40.25f), y(7.5f), 0, 1,
-                        x(12.5f), y(3.25f), 0, 1, x(12.5f), y(30.25f), 0, 1};
-    picture.vertex_count = 4;
-    picture.pipeline.topology = Topology::line_list;
-    expect_same(picture);
+    for (float step : {0.5f, 0.37f}) {
+        picture.vertices = random_triangles(8, picture.width, picture.height, step);
+        picture.vertex_count = 24;
+        picture.pipeline.topology = Topology::line_list;
+        expect_same(picture);
+        picture.pipeline.topology = Topology::line_strip;
+        expect_same(picture);
+    }
 }
 
 constexpr const char* index_vertex = R"(
