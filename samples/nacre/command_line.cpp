@@ -249,7 +249,7 @@ void add_picture(CLI::App& app, SceneArguments& arguments) {
         ->type_name("NAME")
         ->check(one_of({"filmic", "linear"}))
         ->group("Picture");
-    app.add_option("-t,--time", arguments.time, "Seconds into the animation; default 0")
+    app.add_option("-t,--time", arguments.time, "Seconds into the animation; without it, the scene is at rest")
         ->type_name("S")
         ->check(finite_number(-1e6, 1e6, " seconds"))
         ->group("Picture");

@@ -28,7 +28,7 @@ struct SceneArguments {
     std::optional<float> exposure_ev;           ///< Stops; empty: metered.
     std::string tone_mapping = "filmic";
     std::uint32_t frames = 1;
-    float time = 0.0f;                          ///< Seconds.
+    std::optional<float> time;                  ///< Seconds into the animation; empty: the pose at rest.
     std::string dump;                           ///< An intermediate texture; empty: none.
     std::string dump_graph;                     ///< Path of a .svg or .dot; empty: none.
     bool driver_validation = false;

@@ -65,7 +65,7 @@ Expected<void> write_comparison(const std::filesystem::path& folder, const Scene
                                       "profile " + arguments.profile};
     if (!arguments.camera.empty()) facts.push_back("camera " + arguments.camera);
     if (!arguments.environment.empty()) facts.push_back(arguments.environment);
-    if (arguments.time != 0.0f) facts.push_back(fmt::format("{} s", arguments.time));
+    if (arguments.time) facts.push_back(fmt::format("{} s", *arguments.time));
     NACRE_TRY(const auto page, measure::comparison_page(comparison, pairs, std::move(facts), violations));
     return measure::write_report_page(folder / "index.html", page);
 }
