@@ -43,6 +43,7 @@ struct Capabilities {
     bool texture_views = false;         ///< A sampled view may show some layers, or another dimension, of its texture.
     bool texture_view_formats = false;  ///< A view may reinterpret its texture's format (same size).
     bool fill_storage_without_format = false;  ///< imageStore to images declared without a format.
+    bool sampler_mip_bias = false;      ///< SamplerDesc::mip_bias other than 0 (a bias in the shader always works).
 
     // Limits.
     std::uint32_t max_texture_1d = 0;

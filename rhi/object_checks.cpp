@@ -242,6 +242,10 @@ Check check_sampler(const SamplerDesc& desc, const Capabilities& capabilities) {
                        fmt::format("expected 0 <= min_lod <= max_lod and a mip_bias within 15, found {} to {} and {}",
                                    desc.min_lod, desc.max_lod, desc.mip_bias),
                        "Correct the values.");
+    if (desc.mip_bias != 0.0f && !capabilities.sampler_mip_bias)
+        return problem(Rule::sampler_lod, ErrorCode::unsupported,
+                       fmt::format("expected a mip_bias of 0 on a device without sampler_mip_bias, found {}", desc.mip_bias),
+                       "Pass the bias to texture() in the shader.");
     return {};
 }
 

@@ -83,6 +83,7 @@ rhi::Capabilities find_capabilities(const Functions& gl, const Traits& traits) {
     result.texture_views = traits.texture_view;
     result.texture_view_formats = traits.texture_view;
     result.fill_storage_without_format = traits.desktop;
+    result.sampler_mip_bias = traits.desktop;
 
     result.max_texture_2d = query.number(GL_MAX_TEXTURE_SIZE);
     result.max_texture_1d = result.max_texture_2d;

@@ -189,6 +189,7 @@ rhi::Capabilities capabilities_of(const Instance& instance, const PhysicalDevice
     result.texture_views = true;
     result.texture_view_formats = true;
     result.fill_storage_without_format = features.shaderStorageImageWriteWithoutFormat;
+    result.sampler_mip_bias = true;
 
     result.max_texture_1d = limits.maxImageDimension1D;
     result.max_texture_2d = limits.maxImageDimension2D;
