@@ -133,6 +133,10 @@ void Executor::execute(const CommandHeader& header, const std::byte* payload, co
         case begin_list_command: reset_state(); return;
         default: break;
     }
+    // Transfers may change which mips of a texture are seen where parameters stand in for views.
+    if (!driver_.traits.texture_view && header.type >= CommandType::copy_buffer &&
+        header.type <= CommandType::generate_mips)
+        groups_changed_ = true;
     switch (header.type) {
         case CommandType::begin_render_pass: {
             const auto& command = as.operator()<rhi::BeginRenderPassCommand>();

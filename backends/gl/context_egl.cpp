@@ -127,8 +127,13 @@ Expected<std::unique_ptr<Context>> make_on_display(const Egl& egl, EGLDisplay di
         attributes.insert(attributes.end(),
                           {EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT});
     if (desc.debug) attributes.insert(attributes.end(), {EGL_CONTEXT_OPENGL_DEBUG, EGL_TRUE});
+    // Accesses out of bounds stay harmless, and a reset of the graphics card is reported, where the driver can.
+    std::vector<EGLint> robust = attributes;
+    robust.insert(robust.end(), {EGL_CONTEXT_OPENGL_ROBUST_ACCESS, EGL_TRUE,
+                                 EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY, EGL_LOSE_CONTEXT_ON_RESET, EGL_NONE});
     attributes.push_back(EGL_NONE);
-    EGLContext context = egl.CreateContext(display, config, EGL_NO_CONTEXT, attributes.data());
+    EGLContext context = egl.CreateContext(display, config, EGL_NO_CONTEXT, robust.data());
+    if (context == EGL_NO_CONTEXT) context = egl.CreateContext(display, config, EGL_NO_CONTEXT, attributes.data());
     if (context == EGL_NO_CONTEXT) return refuse("eglCreateContext");
     return std::make_unique<EglContext>(egl, display, context, api, std::move(origin));
 }

@@ -103,6 +103,8 @@ GlDevice::~GlDevice() {
         }
         fences_.clear();
         executor_.reset();
+        // The thread may outlive this object, for the sake of resources that are destroyed later.
+        driver_->worker->stop_idling();
     });
 }
 

@@ -32,6 +32,8 @@ class GlTexture : public rhi::BackendTexture {
     Name view(const rhi::ViewReference& reference);
     /// Whether `view` can show it; any thread.
     [[nodiscard]] bool can_view(const rhi::ViewReference& reference) const;
+    /// Whether several ranges of mips can be seen at the same time; any thread.
+    [[nodiscard]] bool can_show_ranges() const { return driver_->traits.texture_view; }
     /// All mips and layers in another format of the same size. Worker thread only.
     Name reinterpret(rhi::Format format);
     /// Makes all mips visible again where `view` has hidden some. Worker thread only.

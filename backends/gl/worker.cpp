@@ -34,7 +34,7 @@ void Worker::loop() {
             task = nullptr;
             lock.lock();
             wants_idle = true;
-        } else if (wants_idle) {
+        } else if (wants_idle && idle_) {
             lock.unlock();
             wants_idle = idle_();
             lock.lock();

@@ -31,6 +31,8 @@ class Worker {
     Worker& operator=(const Worker&) = delete;
 
     void post(std::move_only_function<void()> task);
+    /// Never calls `idle` again. On the worker thread only.
+    void stop_idling() { idle_ = nullptr; }
 
     /// Runs `task` on the thread and waits for its result; at once when called on that thread.
     template <typename Task>
