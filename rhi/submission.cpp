@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 
+#include "rhi/command_validator.h"
 #include "rhi/device_state.h"
 
 namespace nacre::rhi {
@@ -22,8 +23,8 @@ SubresourceRange range_of(const ViewReference& view) {
 
 /// Walks the lists of one submission: replaces handles by the backend's objects and tells the tracker what commands use.
 ///
-/// Checks here hold in every build and with validation off: handles, the order of passes, and that what a draw needs is
-/// bound. They cost a comparison each.
+/// Checks here hold in every build and with validation off: handles, the order of passes, that what a draw needs is bound,
+/// and that copies stay inside of their resources. Those of draws and dispatches cost a comparison each.
 class SubmissionWalk {
   public:
     explicit SubmissionWalk(DeviceState& device) : device_(device), tables_(device.tables()), tracker_(device.tracker) {}
@@ -48,7 +49,8 @@ class SubmissionWalk {
     Step merge_group(BindGroupObject& group, ShaderStage stages, const char* attempted);
     Step check_group(BindGroupObject& group, const char* attempted);
     Step resolve_view(ViewReference& view, const char* attempted, TextureObject*& texture, bool single);
-    Step copy_scope(CommandHeader& header, const char* attempted);
+    Step check_copy(const CommandHeader& header, std::byte* payload);
+    Step copy_scope(CommandHeader& header);
     Step hazard(const char* attempted, std::string what, ResourceState state, bool is_texture) const;
     void unset_state();
 
@@ -346,11 +348,39 @@ SubmissionWalk::Step SubmissionWalk::dispatch(CommandHeader& header, DispatchInd
     return {};
 }
 
-SubmissionWalk::Step SubmissionWalk::copy_scope(CommandHeader& header, const char* attempted) {
-    (void)attempted;
+SubmissionWalk::Step SubmissionWalk::copy_scope(CommandHeader& header) {
     tracker_.end_scope(&header);
     note_statement();
     return {};
+}
+
+/// Copies that nobody has checked while they were recorded. They are few, and a driver does not check them either.
+SubmissionWalk::Step SubmissionWalk::check_copy(const CommandHeader& header, std::byte* payload) {
+    CommandValidator validator(device_.shared, stream_->name);
+    switch (header.type) {
+        case CommandType::copy_buffer: {
+            const auto& copy = *reinterpret_cast<CopyBufferCommand*>(payload);
+            return validator.copy_buffer(copy.source.handle, copy.source_offset, copy.destination.handle,
+                                         copy.destination_offset, copy.size);
+        }
+        case CommandType::copy_buffer_to_texture: {
+            const auto& copy = *reinterpret_cast<CopyBufferToTextureCommand*>(payload);
+            return validator.copy_buffer_and_texture(copy.source.handle, copy.destination.handle, copy.region, true);
+        }
+        case CommandType::copy_texture_to_buffer: {
+            const auto& copy = *reinterpret_cast<CopyTextureToBufferCommand*>(payload);
+            return validator.copy_buffer_and_texture(copy.destination.handle, copy.source.handle, copy.region, false);
+        }
+        case CommandType::copy_texture: {
+            const auto& copy = *reinterpret_cast<CopyTextureCommand*>(payload);
+            return validator.copy_texture(copy.source.handle, copy.destination.handle, copy.region);
+        }
+        case CommandType::fill_buffer: {
+            const auto& fill = *reinterpret_cast<FillBufferCommand*>(payload);
+            return validator.fill_buffer(fill.buffer.handle, fill.offset, fill.size);
+        }
+        default: return {};
+    }
 }
 
 SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* payload) {
@@ -373,6 +403,8 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
     constexpr ResourceState source{ResourceUse::copy_source, ShaderStage::none};
     constexpr ResourceState destination{ResourceUse::copy_destination, ShaderStage::none};
 
+    if (!stream_->validator && header.type >= CommandType::copy_buffer && header.type <= CommandType::fill_buffer)
+        if (auto failed = check_copy(header, payload)) return failed;
     switch (header.type) {
         case CommandType::begin_render_pass:
             return begin_pass(header, as(std::type_identity<BeginRenderPassCommand>{}));
@@ -484,7 +516,7 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
             tracker_.begin_scope();
             if (auto failed = use("copy buffer", *from, source)) return failed;
             if (auto failed = use("copy buffer", *to, destination)) return failed;
-            return copy_scope(header, "copy buffer");
+            return copy_scope(header);
         }
         case CommandType::copy_buffer_to_texture: {
             auto& command = as(std::type_identity<CopyBufferToTextureCommand>{});
@@ -500,7 +532,7 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
             if (auto failed = use("copy buffer to texture", *from, source)) return failed;
             if (auto failed = use("copy buffer to texture", *to, {region.mip, 1, region.layer, 1}, destination, whole))
                 return failed;
-            return copy_scope(header, "copy buffer to texture");
+            return copy_scope(header);
         }
         case CommandType::copy_texture_to_buffer: {
             auto& command = as(std::type_identity<CopyTextureToBufferCommand>{});
@@ -514,7 +546,7 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
             if (auto failed = use("copy texture to buffer", *from, {command.region.mip, 1, command.region.layer, 1}, source))
                 return failed;
             if (auto failed = use("copy texture to buffer", *to, destination)) return failed;
-            return copy_scope(header, "copy texture to buffer");
+            return copy_scope(header);
         }
         case CommandType::copy_texture: {
             auto& command = as(std::type_identity<CopyTextureCommand>{});
@@ -534,7 +566,7 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
                                   {region.destination_mip, 1, region.destination_layer, region.layer_count}, destination,
                                   whole))
                 return failed;
-            return copy_scope(header, "copy texture");
+            return copy_scope(header);
         }
         case CommandType::fill_buffer: {
             auto& command = as(std::type_identity<FillBufferCommand>{});
@@ -545,7 +577,7 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
                 command.size = buffer->desc.size > command.offset ? (buffer->desc.size - command.offset) / 4 * 4 : 0;
             tracker_.begin_scope();
             if (auto failed = use("fill buffer", *buffer, destination)) return failed;
-            return copy_scope(header, "fill buffer");
+            return copy_scope(header);
         }
         case CommandType::clear_texture:
         case CommandType::clear_depth_stencil: {
@@ -558,7 +590,7 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
             if (auto failed = resolve_view(view, attempted, texture, false)) return failed;
             tracker_.begin_scope();
             if (auto failed = use(attempted, *texture, range_of(view), destination, true)) return failed;
-            return copy_scope(header, attempted);
+            return copy_scope(header);
         }
         case CommandType::generate_mips: {
             auto& command = as(std::type_identity<GenerateMipsCommand>{});
@@ -569,7 +601,7 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
             if (auto failed = use("generate mips", *texture, {0, texture->desc.mips, 0, layers_of(texture->desc)},
                                   destination))
                 return failed;
-            return copy_scope(header, "generate mips");
+            return copy_scope(header);
         }
 
         case CommandType::write_timestamp:

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/log.h"
 #include "tests/rhi/null_backend.h"
 
 namespace nacre::rhi {
@@ -115,6 +116,20 @@ TEST(Device, LosingItFailsEveryLaterCallAndANewOneWorks) {
     EXPECT_TRUE(again.device->submit(again.device->create_command_list("list")));
 }
 
+TEST(Device, LossIsLoggedOnce) {
+    DeviceDesc desc;
+    desc.faults.lose_device = 1;
+    std::vector<std::string> lines;
+    const auto previous = set_log_callback([&](LogLevel, std::string_view text) { lines.emplace_back(text); });
+    {
+        NullSetup setup(desc);
+        for (int i = 0; i < 5; ++i) (void)setup.device->submit(setup.device->create_command_list("list"));
+    }
+    set_log_callback(previous);
+    ASSERT_EQ(lines.size(), 1u);
+    EXPECT_NE(lines[0].find("lost"), std::string::npos) << lines[0];
+}
+
 TEST(Device, FailedAllocationLeavesNothingBehind) {
     for (std::uint64_t n = 1; n <= 2; ++n) {
         DeviceDesc desc;
@@ -149,6 +164,45 @@ TEST(BackendSpec, ReadsWhatItWrites) {
     for (const char* text : {"", ":", "gl:", "GL", "gl:lanes=0", "gl:lanes=x", "gl:lanes=4:lanes=4", "gl:speed=1",
                              "gl:lanes=4:osmesa", "gl:lanes=99999999999"})
         EXPECT_FALSE(BackendSpec::parse(text)) << text;
+}
+
+/// A backend whose driver is not there.
+class MissingBackend final : public Backend {
+  public:
+    std::string_view name() const override { return "missing"; }
+    std::span<const Mode> modes() const override { return {}; }
+    Expected<std::vector<AdapterInfo>> adapters() override { return error(); }
+    Expected<std::unique_ptr<BackendDevice>> create_device(const BackendDeviceDesc&) override { return error(); }
+
+  private:
+    static std::unexpected<Error> error() {
+        return fail(ErrorCode::not_found, "open driver", "'libmissing.so'", "there is no such library", "Install it.");
+    }
+};
+
+TEST(Instance, OneMissingDriverLeavesTheOthersUsable) {
+    const auto log = std::make_shared<test::NullLog>();
+    log->capabilities = test::full_capabilities();
+    std::vector<std::unique_ptr<Backend>> backends;
+    backends.push_back(std::make_unique<MissingBackend>());
+    backends.push_back(std::make_unique<test::NullBackend>(log));
+    const Instance instance(std::move(backends));
+    ASSERT_EQ(instance.adapters().size(), 1u);
+    ASSERT_EQ(instance.unavailable().size(), 1u);
+    EXPECT_NE(instance.unavailable()[0].error.message().find("libmissing.so"), std::string::npos);
+    EXPECT_EQ(instance.create_device({.backend = "missing"}).error().code, ErrorCode::not_found);
+    const auto device = instance.create_device();
+    ASSERT_TRUE(device);
+    EXPECT_EQ((*device)->adapter().backend, "null");
+}
+
+TEST(Instance, NamesTheReasonsWhereNothingWorks) {
+    std::vector<std::unique_ptr<Backend>> backends;
+    backends.push_back(std::make_unique<MissingBackend>());
+    const Instance instance(std::move(backends));
+    const auto device = instance.create_device();
+    ASSERT_FALSE(device);
+    EXPECT_NE(device.error().message().find("libmissing.so"), std::string::npos) << device.error().message();
 }
 
 TEST(Instance, NamesWhatItKnows) {

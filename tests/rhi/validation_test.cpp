@@ -5,8 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <fstream>
 #include <functional>
 #include <set>
+#include <sstream>
 
 #include "tests/rhi/validation_bench.h"
 
@@ -547,6 +550,35 @@ TEST(Validation, NumbersRiseAndNamesAreUnique) {
     }
 }
 
+/// Text of docs/validation.md.
+std::string document() {
+    std::string text =
+        "# Messages of the validation layer\n\n"
+        "Generated from the rules (`NACRE_UPDATE_DOCS=1 rhi_front_end_test`). Every message names its code, the objects by the\n"
+        "names that they were given, what was expected, what was found, and what to change:\n\n"
+        "```text\n"
+        "draw list 'frame', pass 'lighting', pipeline 'tone': expected a bind group at index 0, found none\n"
+        "[N-523 bind-group-missing]. Call set_bind_group before; the begin and the end of a render pass unset all of them.\n"
+        "```\n\n"
+        "The text is the same on every backend, because a backend sees valid calls only. Codes never change their meaning.\n"
+        "Descriptions and handles are checked on every device; what is recorded is checked in full where `DeviceDesc::validation` is on\n"
+        "(the default), and for the order of passes, missing pipelines, missing bindings and the range of copies always. A call that\n"
+        "breaks a rule does nothing, returns an `Error` with the same text, and reports a `Message` to\n"
+        "`Device::set_message_callback`.\n\n"
+        "| code | meaning |\n|---|---|\n";
+    for (const ValidationRule& rule : validation_rules()) text += "| `" + std::string(rule.code) + "` | " + std::string(rule.meaning) + " |\n";
+    return text;
+}
+
+TEST(Validation, DocumentListsEveryRule) {
+    const std::string path = std::string(NACRE_SOURCE_DIR) + "/docs/validation.md";
+    if (std::getenv("NACRE_UPDATE_DOCS")) std::ofstream(path) << document();
+    std::ifstream file(path);
+    std::ostringstream text;
+    text << file.rdbuf();
+    EXPECT_EQ(text.str(), document()) << "run NACRE_UPDATE_DOCS=1 rhi_front_end_test";
+}
+
 TEST(Validation, FirstErrorOfAListIsKeptAndReturned) {
     Bench bench;
     CommandList list = bench.list();
@@ -590,6 +622,11 @@ TEST(Validation, WhatMustNeverReachADriverIsFoundWithoutIt) {
     EXPECT_TRUE(refused([](Bench& b, CommandList& l) { l.begin_render_pass({.color = {{.view = b.target()}}}); }));
     EXPECT_TRUE(refused([](Bench& b, CommandList& l) { l.begin_render_pass({.color = {{.view = b.target()}}}); l.draw({.vertex_count = 3}); l.end_render_pass(); }));
     EXPECT_TRUE(refused([](Bench&, CommandList& l) { l.end_render_pass(); }));
+    EXPECT_TRUE(refused([](Bench& b, CommandList& l) { l.copy_buffer(b.buffer(copies), 200, b.buffer(copies), 0, 57); }));
+    EXPECT_TRUE(refused([](Bench& b, CommandList& l) { l.copy_buffer_to_texture(b.buffer(copies), b.texture(texture_copies)); }));
+    EXPECT_TRUE(refused([](Bench& b, CommandList& l) { l.copy_texture_to_buffer(b.texture(texture_copies), b.buffer(copies)); }));
+    EXPECT_TRUE(refused([](Bench& b, CommandList& l) { l.copy_texture(b.texture(texture_copies), b.texture(texture_copies), {.source_layer = 7}); }));
+    EXPECT_TRUE(refused([](Bench& b, CommandList& l) { l.fill_buffer(b.buffer(copies), 0, 0, 1024); }));
     EXPECT_FALSE(refused([](Bench& b, CommandList& l) { l.begin_render_pass({.color = {{.view = b.target()}}}); l.set_pipeline(b.graphics()); l.draw({.vertex_count = 3}); l.end_render_pass(); }));
 }
 
