@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What fails is reported, leaves nothing behind (the validation layer would tell), and a new device works afterwards.
+#include <cstdlib>
 #include <cstring>
+#include <optional>
 #include <thread>
 
 #include "tests/backends/vulkan/vulkan_device.h"
@@ -120,6 +122,55 @@ TEST(VulkanFaults, SaysWhatIsWrongWithASpec) {
     const auto unknown_device = instance.create_device({.backend = "vulkan", .adapter = 4711});
     ASSERT_FALSE(unknown_device);
     EXPECT_NE(unknown_device.error().message().find("4711"), std::string::npos) << unknown_device.error().message();
+}
+
+/// Sets a variable of the environment for one scope.
+class Environment {
+  public:
+    Environment(const char* name, const char* value) : name_(name) {
+        if (const char* old = std::getenv(name)) old_ = old;
+        ::setenv(name, value, 1);
+    }
+    ~Environment() {
+        if (old_)
+            ::setenv(name_, old_->c_str(), 1);
+        else
+            ::unsetenv(name_);
+    }
+    Environment(const Environment&) = delete;
+    Environment& operator=(const Environment&) = delete;
+
+  private:
+    const char* name_;
+    std::optional<std::string> old_;
+};
+
+TEST(VulkanFaults, SaysWhatToInstallWhereNoDriverIs) {
+    if (!make_backend()->adapters()) GTEST_SKIP() << "no Vulkan device";
+    {
+        // Both names that the loader has had for it.
+        const Environment old_name("VK_ICD_FILENAMES", "/nonexistent/driver.json");
+        const Environment new_name("VK_DRIVER_FILES", "/nonexistent/driver.json");
+        const auto adapters = make_backend()->adapters();
+        ASSERT_FALSE(adapters);
+        EXPECT_EQ(adapters.error().code, ErrorCode::not_found);
+        EXPECT_NE(adapters.error().message().find("mesa-vulkan-drivers"), std::string::npos)
+            << adapters.error().message();
+    }
+    EXPECT_TRUE(make_backend()->adapters());
+}
+
+TEST(VulkanFaults, SaysWhatToInstallWhereTheValidationLayerIsMissing) {
+    if (!make_backend()->adapters()) GTEST_SKIP() << "no Vulkan device";
+    const Environment nowhere("VK_LAYER_PATH", "/nonexistent");
+    std::vector<std::unique_ptr<Backend>> backends;
+    backends.push_back(make_backend());
+    const Instance instance(std::move(backends));
+    const auto device = instance.create_device({.backend = "vulkan", .driver_validation = true});
+    ASSERT_FALSE(device);
+    EXPECT_EQ(device.error().code, ErrorCode::not_found);
+    EXPECT_NE(device.error().message().find("vulkan-validationlayers"), std::string::npos) << device.error().message();
+    EXPECT_TRUE(instance.create_device({.backend = "vulkan"}));
 }
 
 TEST(VulkanDevices, LiveSideBySide) {
