@@ -24,6 +24,8 @@ void prepare_for_drivers() {
     // Lavapipe of Mesa 22.3 keeps 128 bytes when it is unloaded with the last instance. Reported from a library that is
     // no longer there, the leak has no name that a suppression could match; from a resident one there is none.
     (void)DynamicLibrary::open({"libvulkan_lvp.so"}, "", LibraryLifetime::resident);
+    // The validation layer keeps some of its records of destroyed pipelines. Resident, it can be suppressed by name.
+    (void)DynamicLibrary::open({"libVkLayer_khronos_validation.so"}, "", LibraryLifetime::resident);
 #endif
 }
 
