@@ -61,12 +61,20 @@ rhi::Texture PassContext::texture(TextureId id) const { return graph.texture(id)
 rhi::Buffer PassContext::buffer(BufferId id) const { return graph.buffer(id); }
 
 PassDeclaration& PassDeclaration::uses(TextureId texture, ResourceUse use) {
-    if (texture) graph_->passes_[pass_].accesses.push_back({true, texture.index, use});
+    if (texture) graph_->passes_[pass_].accesses.push_back({.is_texture = true, .resource = texture.index, .use = use});
     return *this;
 }
 
 PassDeclaration& PassDeclaration::uses(BufferId buffer, ResourceUse use) {
-    if (buffer) graph_->passes_[pass_].accesses.push_back({false, buffer.index, use});
+    if (buffer) graph_->passes_[pass_].accesses.push_back({.is_texture = false, .resource = buffer.index, .use = use});
+    return *this;
+}
+
+PassDeclaration& PassDeclaration::only_if(std::size_t count, std::function<bool()> condition) {
+    std::vector<FrameGraph::Access>& accesses = graph_->passes_[pass_].accesses;
+    for (std::size_t i = accesses.size() - std::min(count, accesses.size()); i < accesses.size(); ++i) {
+        accesses[i].condition = condition;
+    }
     return *this;
 }
 
@@ -246,6 +254,7 @@ void FrameGraph::record(rhi::CommandList& list, rhi::QueryPool timestamps) const
         if (!pass.is_live) continue;
         statement.clear();
         for (const Access& access : pass.accesses) {
+            if (access.condition && !access.condition()) continue;
             rhi::StatedAccess stated{.use = access.use};
             if (access.is_texture) {
                 stated.texture = textures_[access.resource].handle;

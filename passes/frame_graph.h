@@ -57,6 +57,8 @@ class PassDeclaration {
     /// only in part keeps what was there before.
     PassDeclaration& uses(TextureId texture, rhi::ResourceUse use);
     PassDeclaration& uses(BufferId buffer, rhi::ResourceUse use);
+    /// The uses added by the last `count` calls are made in a frame only if the condition holds then.
+    PassDeclaration& only_if(std::size_t count, std::function<bool()> condition);
     /// The pass is never left out.
     PassDeclaration& always();
     PassDeclaration& records(std::function<void(PassContext&)> function);
@@ -75,6 +77,7 @@ class FrameGraph {
         bool is_texture = true;
         std::uint32_t resource = 0;
         rhi::ResourceUse use = rhi::ResourceUse::none;
+        std::function<bool()> condition{};  ///< Empty: in every frame.
     };
     struct Pass {
         std::string name;

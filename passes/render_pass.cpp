@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <map>
-#include <set>
 #include <tuple>
 
 namespace nacre::passes {
@@ -121,34 +120,63 @@ GeometryDraws::~GeometryDraws() {
 }
 
 void uses_geometry(PassDeclaration& pass, const RenderContext& context, const GeometryPassDesc& desc,
-                   std::span<const std::uint32_t> draws) {
+                   std::span<const std::uint32_t> draws, std::span<const FrameUse> with_any,
+                   std::span<const std::vector<bool>> views) {
     const FrameResources& resources = context.resources;
-    std::uint32_t attributes = 0;
-    std::set<std::uint32_t> textures;
+    // Which draws read a resource: the pass reads it in frames in which one of them is seen.
+    std::map<std::uint32_t, std::vector<std::uint32_t>> attribute_readers, texture_readers;
     for (const std::uint32_t index : draws) {
         const Draw& draw = context.geometry.draws()[index];
-        attributes |= restricted(draw.features, desc.textures, desc.with_normals, desc.with_colors).attributes;
+        const std::uint32_t attributes =
+            restricted(draw.features, desc.textures, desc.with_normals, desc.with_colors).attributes;
+        for (std::uint32_t a = 0; a < attribute_count; ++a) {
+            if ((attributes & (1u << a)) != 0) attribute_readers[a].push_back(index);
+        }
         if (desc.fragment_shader.empty()) continue;
-        const auto& of_material = context.materials.textures_of(draw.material);
-        textures.insert(of_material.begin(), of_material.end());
+        for (const std::uint32_t texture : context.materials.textures_of(draw.material)) {
+            texture_readers[texture].push_back(index);
+        }
     }
+    const auto any_seen = [&context, views](std::vector<std::uint32_t> readers) {
+        return [&context, views, seen = std::move(readers)] {
+            const auto in = [&seen](const std::vector<bool>& visible) {
+                return std::ranges::any_of(seen, [&](std::uint32_t draw) { return visible[draw]; });
+            };
+            return views.empty() ? in(context.visible) : std::ranges::any_of(views, in);
+        };
+    };
+    const std::vector<std::uint32_t> all(draws.begin(), draws.end());
+    if (all.empty()) return;
+    for (const FrameUse& use : with_any) pass.uses(use.buffer, use.use).uses(use.texture, use.use);
+    std::size_t added = 0;
+    for (const FrameUse& use : with_any) added += (use.buffer ? 1u : 0u) + (use.texture ? 1u : 0u);
+    pass.only_if(added, any_seen(all));
     for (std::size_t i = 0; i < resources.geometry.size(); ++i) {
         const SceneGeometry::NamedBuffer& buffer = context.geometry.buffers()[i];
-        const bool read = buffer.attribute == ~0u || (attributes & (1u << buffer.attribute)) != 0;
-        if (read) pass.uses(resources.geometry[i], buffer.use);
+        if (buffer.attribute == ~0u) {
+            pass.uses(resources.geometry[i], buffer.use).only_if(1, any_seen(all));
+        } else if (const auto readers = attribute_readers.find(buffer.attribute); readers != attribute_readers.end()) {
+            pass.uses(resources.geometry[i], buffer.use).only_if(1, any_seen(readers->second));
+        }
     }
     if (desc.fragment_shader.empty()) return;
-    pass.uses(resources.materials, ResourceUse::uniform_buffer);
-    for (const std::uint32_t texture : textures) pass.uses(resources.material_textures[texture], ResourceUse::sampled);
+    pass.uses(resources.materials, ResourceUse::uniform_buffer).only_if(1, any_seen(all));
+    for (const auto& [texture, readers] : texture_readers) {
+        pass.uses(resources.material_textures[texture], ResourceUse::sampled).only_if(1, any_seen(readers));
+    }
+}
+
+std::vector<FrameUse> lighting_uses(const FrameResources& resources) {
+    return {{.buffer = resources.camera, .use = ResourceUse::uniform_buffer},
+            {.buffer = resources.lights, .use = ResourceUse::uniform_buffer},
+            {.buffer = resources.irradiance, .use = ResourceUse::uniform_buffer},
+            {.texture = resources.albedo_table, .use = ResourceUse::sampled},
+            {.texture = resources.environment, .use = ResourceUse::sampled},
+            {.texture = resources.shadow_maps, .use = ResourceUse::sampled}};
 }
 
 void uses_lighting(PassDeclaration& pass, const FrameResources& resources) {
-    pass.uses(resources.camera, ResourceUse::uniform_buffer)
-        .uses(resources.lights, ResourceUse::uniform_buffer)
-        .uses(resources.irradiance, ResourceUse::uniform_buffer)
-        .uses(resources.albedo_table, ResourceUse::sampled)
-        .uses(resources.environment, ResourceUse::sampled)
-        .uses(resources.shadow_maps, ResourceUse::sampled);
+    for (const FrameUse& use : lighting_uses(resources)) pass.uses(use.buffer, use.use).uses(use.texture, use.use);
 }
 
 std::vector<rhi::ShaderDefine> lighting_defines(const Decisions& decisions) {
@@ -156,6 +184,7 @@ std::vector<rhi::ShaderDefine> lighting_defines(const Decisions& decisions) {
     if (decisions.light_capacity > 0) defines.push_back({"LIGHTS", std::to_string(decisions.light_capacity)});
     if (decisions.shadow_capacity > 0) {
         defines.push_back({"SHADOW_VIEWS", std::to_string(decisions.shadow_capacity)});
+        if (decisions.shadow_view_count > 1) defines.push_back({"SHADOW_LAYERS"});
         defines.push_back({"SHADOW_FILTER_WIDTH", std::to_string(decisions.shadow_filter_width)});
     }
     return defines;

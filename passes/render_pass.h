@@ -142,9 +142,21 @@ std::vector<std::uint32_t> select_draws(const SceneGeometry& geometry, Predicate
     return result;
 }
 
-/// States what drawing these draws in a pass of this description reads.
+/// A use of a buffer or of a texture.
+struct FrameUse {
+    BufferId buffer{};
+    TextureId texture{};
+    rhi::ResourceUse use = rhi::ResourceUse::none;
+};
+
+/// States what drawing these draws in a pass of this description reads, and `with_any` of them (the camera); in a frame
+/// only as far as the camera, or one of `views` where there are some, sees the draws. The context and the views outlive
+/// the graph's recording.
 void uses_geometry(PassDeclaration& pass, const RenderContext& context, const GeometryPassDesc& desc,
-                   std::span<const std::uint32_t> draws);
+                   std::span<const std::uint32_t> draws, std::span<const FrameUse> with_any,
+                   std::span<const std::vector<bool>> views = {});
+/// What lighting reads, for `with_any`.
+std::vector<FrameUse> lighting_uses(const FrameResources& resources);
 /// States that a pass reads lights, shadows and environment.
 void uses_lighting(PassDeclaration& pass, const FrameResources& resources);
 /// Defines of passes/shared/lighting.glsl.

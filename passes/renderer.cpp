@@ -437,9 +437,7 @@ Expected<void> Renderer::State::make_passes() {
     entries.push_back({.binding = 3, .texture = albedo_table, .sampler = linear});
     entries.push_back({.binding = 4, .texture = environment->cube(), .sampler = linear});
     if (decisions.shadow_view_count > 0) {
-        rhi::TextureView layers(graph.texture(resources.shadow_maps));
-        layers.dimension = rhi::ViewDimension::d2_array;
-        entries.push_back({.binding = 5, .texture = layers, .sampler = nearest});
+        entries.push_back({.binding = 5, .texture = graph.texture(resources.shadow_maps), .sampler = nearest});
     }
     NACRE_TRY(lighting_group,
               device.create_bind_group({.layout = lighting_layout, .entries = entries, .name = "light"}));

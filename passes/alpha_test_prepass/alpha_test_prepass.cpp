@@ -29,8 +29,9 @@ class AlphaTestPrepass final : public RenderPass {
         });
         group_ = context.camera_group;
         PassDeclaration pass = context.graph.add_pass(name);
-        pass.uses(depth_, ResourceUse::depth_stencil_write).uses(context.resources.camera, ResourceUse::uniform_buffer);
-        uses_geometry(pass, context, desc_, selected_);
+        pass.uses(depth_, ResourceUse::depth_stencil_write);
+        const FrameUse camera[] = {{.buffer = context.resources.camera, .use = ResourceUse::uniform_buffer}};
+        uses_geometry(pass, context, desc_, selected_, camera);
         pass.records([this](PassContext& frame) {
             frame.list.begin_render_pass({.depth_stencil = {.view = frame.texture(depth_)}, .name = name});
             draws_.record(frame.list, group_, visible_);

@@ -38,8 +38,8 @@ class BasePass final : public RenderPass {
             .uses(resources_.material_1, ResourceUse::color_target)
             .uses(resources_.top_layer, ResourceUse::color_target)
             .uses(resources_.depth, ResourceUse::depth_stencil_read);
-        if (!selected_.empty()) pass.uses(context.resources.camera, ResourceUse::uniform_buffer);
-        uses_geometry(pass, context, desc_, selected_);
+        const FrameUse camera[] = {{.buffer = context.resources.camera, .use = ResourceUse::uniform_buffer}};
+        uses_geometry(pass, context, desc_, selected_, camera);
         pass.records([this](PassContext& frame) {
             rhi::RenderPassDesc target{.depth_stencil = {.view = frame.texture(resources_.depth), .read_only = true},
                                        .name = name};

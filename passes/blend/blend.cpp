@@ -54,8 +54,7 @@ class Blend final : public RenderPass {
                                               .destination_alpha = rhi::BlendFactor::one}}};
             PassDeclaration pass = context.graph.add_pass(name);
             pass.uses(resources.lit, ResourceUse::color_target).uses(resources.depth, ResourceUse::depth_stencil_read);
-            uses_lighting(pass, resources);
-            uses_geometry(pass, context, desc_, sorted_);
+            uses_geometry(pass, context, desc_, sorted_, lighting_uses(resources));
             pass.records([this, lit = resources.lit, depth = resources.depth](PassContext& frame) {
                 frame.list.begin_render_pass({.color = {{.view = frame.texture(lit)}},
                                               .depth_stencil = {.view = frame.texture(depth), .read_only = true},
@@ -91,6 +90,10 @@ class Blend final : public RenderPass {
             return glm::dot(offset, offset);
         };
         std::ranges::stable_sort(sorted_, std::greater<>{}, distance);
+        for (Group& group : groups_) {
+            group.visible.assign(visible_.size(), false);
+            for (std::size_t i = group.first; i < group.last; ++i) group.visible[sorted_[i]] = visible_[sorted_[i]];
+        }
     }
     [[nodiscard]] std::uint64_t draw_count() const override { return draws_.size(); }
 
@@ -99,6 +102,7 @@ class Blend final : public RenderPass {
         std::size_t first = 0, last = 0;
         TextureId below, above;
         ComputeStep composite;
+        std::vector<bool> visible;  ///< Draws that are in this group and seen, in this frame.
     };
 
     void draw_range(rhi::CommandList& list, std::size_t first, std::size_t last) const {
@@ -133,8 +137,7 @@ class Blend final : public RenderPass {
             draw_pass.uses(color_, ResourceUse::color_target)
                 .uses(coverage_, ResourceUse::color_target)
                 .uses(resources.depth, ResourceUse::depth_stencil_write);
-            uses_lighting(draw_pass, resources);
-            uses_geometry(draw_pass, context, desc_, sorted_);
+            uses_geometry(draw_pass, context, desc_, sorted_, lighting_uses(resources), {&group.visible, 1});
             draw_pass.records([this, i, depth = resources.depth](PassContext& frame) {
                 rhi::ColorAttachment color{.view = frame.texture(color_), .load = rhi::LoadOperation::clear};
                 color.clear.uint = {0, 0, 0, 0};

@@ -33,8 +33,8 @@ class DepthPrepass final : public RenderPass {
         group_ = context.camera_group;
         PassDeclaration pass = context.graph.add_pass(name);
         pass.uses(depth_, ResourceUse::depth_stencil_write);
-        if (!selected_.empty()) pass.uses(context.resources.camera, ResourceUse::uniform_buffer);
-        uses_geometry(pass, context, desc_, selected_);
+        const FrameUse camera[] = {{.buffer = context.resources.camera, .use = ResourceUse::uniform_buffer}};
+        uses_geometry(pass, context, desc_, selected_, camera);
         pass.records([this](PassContext& frame) {
             frame.list.begin_render_pass({.depth_stencil = {.view = frame.texture(depth_),
                                                             .depth_load = rhi::LoadOperation::clear,

@@ -46,9 +46,9 @@ class Emission final : public RenderPass {
         group_ = context.camera_group;
         PassDeclaration pass = context.graph.add_pass(name);
         pass.uses(packed_ ? resources_.emission : resources_.lit, ResourceUse::color_target)
-            .uses(resources_.depth, ResourceUse::depth_stencil_write)
-            .uses(resources_.camera, ResourceUse::uniform_buffer);
-        uses_geometry(pass, context, desc_, selected_);
+            .uses(resources_.depth, ResourceUse::depth_stencil_write);
+        const FrameUse camera[] = {{.buffer = context.resources.camera, .use = ResourceUse::uniform_buffer}};
+        uses_geometry(pass, context, desc_, selected_, camera);
         pass.records([this](PassContext& frame) {
             rhi::ColorAttachment attachment{.view = frame.texture(packed_ ? resources_.emission : resources_.lit),
                                             .load = packed_ ? rhi::LoadOperation::clear : rhi::LoadOperation::load};

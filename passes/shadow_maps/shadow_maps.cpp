@@ -44,9 +44,9 @@ class ShadowMaps final : public RenderPass {
         masked_ = of_mode(materials::AlphaMode::mask);
         PassDeclaration pass = context.graph.add_pass(name);
         pass.uses(shadow_maps_, ResourceUse::depth_stencil_write);
-        if (!opaque_.empty() || !masked_.empty()) pass.uses(context.resources.shadow_cameras, ResourceUse::uniform_buffer);
-        uses_geometry(pass, context, opaque_desc_, opaque_);
-        if (!masked_.empty()) uses_geometry(pass, context, masked_desc_, masked_);
+        const FrameUse cameras[] = {{.buffer = context.resources.shadow_cameras, .use = ResourceUse::uniform_buffer}};
+        uses_geometry(pass, context, opaque_desc_, opaque_, cameras, visible_);
+        uses_geometry(pass, context, masked_desc_, masked_, cameras, visible_);
         pass.records([this](PassContext& frame) {
             for (std::uint32_t view = 0; view < views_.size(); ++view) {
                 frame.list.begin_render_pass(

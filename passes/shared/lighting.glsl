@@ -5,7 +5,7 @@
 // the camera is binding 0. The same code serves the tiled lighting and the blend pass.
 //
 // LIGHTS: number of entries in the light list; undefined: no lights. SHADOW_VIEWS: number of shadow views; undefined: no
-// shadows. SHADOW_FILTER_WIDTH: 1, 3 or 5.
+// shadows. SHADOW_LAYERS: there are several, and the map has layers. SHADOW_FILTER_WIDTH: 1, 3 or 5.
 #include "passes/shared/camera.glsl"
 #include "passes/shared/ggx.glsl"
 #include "passes/shared/slab.glsl"
@@ -33,7 +33,13 @@ layout(set = 0, binding = 2, std140) uniform IrradianceBlock {
 layout(set = 0, binding = 3) uniform sampler2D albedo_table;
 layout(set = 0, binding = 4) uniform samplerCube environment;
 #ifdef SHADOW_VIEWS
+#ifdef SHADOW_LAYERS
 layout(set = 0, binding = 5) uniform sampler2DArray shadow_maps;
+#define fetch_shadow(at, view) texelFetch(shadow_maps, ivec3(at, view), 0).r
+#else
+layout(set = 0, binding = 5) uniform sampler2D shadow_maps;
+#define fetch_shadow(at, view) texelFetch(shadow_maps, at, 0).r
+#endif
 
 int cube_face(vec3 direction) {
     vec3 size = abs(direction);
@@ -66,7 +72,7 @@ float shadow(Light light, vec3 position, vec3 normal, vec3 to_light, float dista
         for (int x = 0; x <= SHADOW_FILTER_WIDTH; ++x) {
             float weight_x = x == 0 ? 1.0 - part.x : (x == SHADOW_FILTER_WIDTH ? part.x : 1.0);
             ivec2 at = clamp(ivec2(corner) + ivec2(x, y), ivec2(0), size - 1);
-            float occluder = texelFetch(shadow_maps, ivec3(at, view), 0).r;
+            float occluder = fetch_shadow(at, view);
             lit += ndc.z >= occluder ? weight_x * weight_y : 0.0;
         }
     }
@@ -81,7 +87,7 @@ vec3 shade_slab(Slab slab, vec3 position, vec3 to_viewer) {
     // Shading normals may point away from the viewer; the cosine is kept off 0 so that nothing divides by it.
     float cos_o = max(dot(slab.normal, to_viewer), 1e-4);
     vec2 table_size = vec2(textureSize(albedo_table, 0));
-    vec2 table = textureLod(albedo_table, (vec2(min(cos_o, 1.0), slab.roughness) * (table_size - 1.0) + 0.5) / table_size, 0.0).rg;
+    vec2 table = textureLod(albedo_table, (vec2(sqrt(min(cos_o, 1.0)), slab.roughness) * (table_size - 1.0) + 0.5) / table_size, 0.0).rg;
     SpecularAlbedo specular = specular_albedo(slab.f0, slab.f90, table);
     // What the interface does not reflect towards the viewer is left to the base. One number for all channels: a tinted
     // interface must not give the base the complementary color.

@@ -19,7 +19,7 @@ namespace nacre::passes {
 ///
 /// @param cos_theta  cosine between normal and direction, (0, 1]
 /// @param roughness  perceptual; alpha is its square, [0, 1]
-/// @param strata     samples are strata^2, on a regular grid; 64 gives four digits
+/// @param strata     samples are strata^2; 64 gives four digits
 /// Source of the sampling: Heitz 2018, "Sampling the GGX distribution of visible normals".
 inline std::array<double, 2> directional_albedo_terms(double cos_theta, double roughness, int strata) {
     const double alpha = roughness * roughness;
@@ -39,8 +39,11 @@ inline std::array<double, 2> directional_albedo_terms(double cos_theta, double r
     double first = 0.0, second = 0.0;
     for (int i = 0; i < strata; ++i) {
         for (int j = 0; j < strata; ++j) {
+            // Strata crowd towards the rim, where smooth surfaces have their few but strongly tilted microfacets.
+            const double s_radial = (i + 0.5) / strata;
+            const double density = 3.0 * (1.0 - s_radial) * (1.0 - s_radial);
             // A point of the projected hemisphere. Frame: the stretched view, the y axis, and their cross product.
-            const double r = std::sqrt((i + 0.5) / strata);
+            const double r = std::sqrt(1.0 - std::pow(1.0 - s_radial, 3.0));
             const double phi = 2.0 * std::numbers::pi * (j + 0.5) / strata;
             const double t1 = r * std::cos(phi);
             double t2 = r * std::sin(phi);
@@ -58,7 +61,7 @@ inline std::array<double, 2> directional_albedo_terms(double cos_theta, double r
             const double cos_oh = hx * sin_o + hz * mu;
             const double cos_i = 2.0 * cos_oh * hz - mu;
             if (cos_i <= 0.0 || cos_oh <= 0.0) continue;
-            const double weight = (1.0 + lambda(mu)) / (1.0 + lambda(mu) + lambda(cos_i));
+            const double weight = density * (1.0 + lambda(mu)) / (1.0 + lambda(mu) + lambda(cos_i));
             const double grazing = std::pow(1.0 - std::min(cos_oh, 1.0), 5.0);
             first += weight * (1.0 - grazing);
             second += weight * grazing;

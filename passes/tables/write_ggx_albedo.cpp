@@ -4,6 +4,7 @@
 ///
 ///     build/bin/write_ggx_albedo > passes/tables/ggx_albedo_data.inc
 
+#include <cmath>
 #include <cstdio>
 #include <glm/gtc/packing.hpp>
 
@@ -16,7 +17,7 @@ int main() {
     std::puts("// Written by passes/tables/write_ggx_albedo.cpp.");
     for (std::uint32_t row = 0; row < ggx_albedo_size; ++row) {
         for (std::uint32_t column = 0; column < ggx_albedo_size; ++column) {
-            const auto terms = directional_albedo_terms(column / (ggx_albedo_size - 1.0), row / (ggx_albedo_size - 1.0), 128);
+            const auto terms = directional_albedo_terms(std::pow(column / (ggx_albedo_size - 1.0), 2.0), row / (ggx_albedo_size - 1.0), 128);
             std::printf("0x%04x,0x%04x,%s", glm::packHalf1x16(static_cast<float>(terms[0])),
                         glm::packHalf1x16(static_cast<float>(terms[1])), column % 8 == 7 ? "\n" : "");
         }

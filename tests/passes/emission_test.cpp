@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/shapes.h"
+#include "tests/passes/renderer_test.h"
+
+namespace nacre::test {
+namespace {
+
+RENDERER_SUITE(Emission);
+
+materials::MaterialDescription lamp(const glm::vec3& emission) {
+    materials::MaterialDescription material = lambert(glm::vec3(0.0f));
+    material.emissive = emission;
+    return material;
+}
+
+scene::Primitive sheet(float z) { return scene::parallelogram({-1, -1, z}, {2, 0, 0}, {0, 2, 0}); }
+
+TEST_P(Emission, IsAddedToWhatIsReflected) {
+    scene::Scene scene = empty_scene();
+    scene.environment = uniform_environment(glm::vec3(1.0f));
+    materials::MaterialDescription material = lambert(glm::vec3(0.25f));
+    material.emissive = {1.0f, 0.5f, 0.0f};
+    material.emissive_strength = 4.0f;
+    place(scene, sheet(0.0f), add_material(scene, material));
+    const Shot shot = render(scene, {.width = 32, .height = 32, .exposure_ev = 0.0f});
+    EXPECT_NEAR(shot.radiance_at(16, 16).r, 4.25f, 0.02f);
+    EXPECT_NEAR(shot.radiance_at(16, 16).g, 2.25f, 0.02f);
+    EXPECT_NEAR(shot.radiance_at(16, 16).b, 0.25f, 5e-3f);
+}
+
+// Faces that coincide give their light once, and hidden ones none.
+TEST_P(Emission, CoincidingFacesShineOnce) {
+    scene::Scene scene = empty_scene();
+    const std::uint32_t material = add_material(scene, lamp(glm::vec3(2.0f)));
+    place(scene, sheet(0.0f), material);
+    place(scene, sheet(0.0f), material);
+    place(scene, sheet(-1.0f), material);
+    const Shot shot = render(scene, {.width = 32, .height = 32, .exposure_ev = 0.0f});
+    for (std::uint32_t y = 0; y < 32; ++y) {
+        for (std::uint32_t x = 0; x < 32; ++x) ASSERT_NEAR(shot.radiance_at(x, y).g, 2.0f, 5e-3f) << x << ", " << y;
+    }
+}
+
+TEST_P(Emission, OfAnySizeStaysFinite) {
+    scene::Scene scene = empty_scene();
+    materials::MaterialDescription material = lamp(glm::vec3(1.0f));
+    material.emissive_strength = 1e38f;
+    place(scene, sheet(0.0f), add_material(scene, material));
+    const Shot shot = render(scene, {.width = 32, .height = 32});
+    EXPECT_GT(shot.radiance_at(16, 16).g, 6e4f);
+    EXPECT_TRUE(std::isfinite(shot.statistics.exposure_ev));
+}
+
+}  // namespace
+}  // namespace nacre::test

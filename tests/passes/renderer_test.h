@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <glm/glm.hpp>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "passes/renderer.h"
+#include "scene/scene.h"
+
+/// @file
+/// Tests of whole pictures, registered once and run on every backend present.
+///
+///     RENDERER_SUITE(Furnace);
+///     TEST_P(Furnace, WhiteMetalVanishes) {
+///         const Shot shot = render(scene, {.width = 64, .height = 64});
+///         EXPECT_NEAR(shot.radiance_at(32, 32).r, 1.0f, 2e-3f);
+///     }
+///
+/// Devices have our validation, the driver's and verify mode on; any message fails the test. Every picture is searched for
+/// values that are negative or not finite.
+
+namespace nacre::test {
+
+struct RenderVariant {
+    std::string name, backend, restriction, profile;
+};
+inline void PrintTo(const RenderVariant& variant, std::ostream* out) { *out << variant.name; }
+
+/// Those of which a device can be made here.
+const std::vector<RenderVariant>& render_variants();
+
+/// A frame, and the renderer that can still be asked.
+struct Shot {
+    std::unique_ptr<passes::Renderer> renderer;
+    passes::FrameStatistics statistics;
+    passes::FinalPicture picture;
+
+    [[nodiscard]] glm::vec3 radiance_at(std::uint32_t x, std::uint32_t y) const;
+    [[nodiscard]] glm::ivec3 bytes_at(std::uint32_t x, std::uint32_t y) const;
+    /// The words or floats of an intermediate texture.
+    template <typename T>
+    [[nodiscard]] std::vector<T> intermediate(const char* name, std::uint32_t layer = 0) const {
+        auto content = renderer->read_intermediate(name, layer);
+        if (!content) {
+            ADD_FAILURE() << content.error().message();
+            return {};
+        }
+        std::vector<T> values(content->bytes.size() / sizeof(T));
+        std::memcpy(values.data(), content->bytes.data(), values.size() * sizeof(T));
+        return values;
+    }
+    [[nodiscard]] bool has_pass(std::string_view name) const;
+    [[nodiscard]] bool has_resource(std::string_view name) const;
+};
+
+class RendererTest : public ::testing::TestWithParam<RenderVariant> {
+  public:
+    void SetUp() override;
+    void TearDown() override;
+
+    rhi::Device& device() { return *device_; }
+    /// Renders one frame with the variant's profile (unless the options name another than "high") and looks it over.
+    Shot render(const scene::Scene& scene, passes::RenderOptions options);
+
+  private:
+    rhi::Device* device_ = nullptr;
+};
+
+/// Destroys the devices, before the static objects of drivers and layers go.
+void release_devices();
+/// Messages that a device has given so far.
+std::vector<std::string> messages_of(const RenderVariant& variant);
+
+/// A scene with a material and nothing else; black environment; camera of 2 x 2 meters looking down -Z from z = 10.
+scene::Scene empty_scene();
+/// An environment of one color.
+scene::Environment uniform_environment(const glm::vec3& radiance);
+/// Adds a material; returns its index.
+std::uint32_t add_material(scene::Scene& scene, const materials::MaterialDescription& material);
+/// A material that only scatters diffusely.
+materials::MaterialDescription lambert(const glm::vec3& albedo);
+/// Places a primitive with a material.
+void place(scene::Scene& scene, scene::Primitive primitive, std::uint32_t material,
+           const glm::mat4& transform = glm::mat4(1.0f));
+scene::Light directional_light(const glm::vec3& direction, float lux);
+
+#define RENDERER_SUITE(Suite)                                                                        \
+    class Suite : public ::nacre::test::RendererTest {};                                             \
+    GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Suite);                                            \
+    INSTANTIATE_TEST_SUITE_P(Passes, Suite, ::testing::ValuesIn(::nacre::test::render_variants()),   \
+                             [](const auto& parameter) { return parameter.param.name; })
+
+}  // namespace nacre::test
