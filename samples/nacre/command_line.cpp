@@ -332,6 +332,7 @@ struct Definition {
         add_picture(*command, compare.scene);
         add_output_options(*command, compare.scene,
                            "Compare this texture alone; with -o FOLDER its pictures are written as well");
+        add_dump_graph(*command, compare.scene);
         add_json(*command, compare.scene.json);
 
         command = app.add_subcommand("diff", "Compare two picture files");

@@ -29,6 +29,8 @@ Attempt<measure::SceneComparison> run_comparison(const SceneSession& scene, cons
     NACRE_TRY(measure::SceneComparison comparison,
               measure::compare_backends(scene.arguments().scene, contestants, options));
     for (const RenderSession& session : sessions) NACRE_CHECK(check_messages(session));
+    // Passes are the same on all backends; the graph drawn is that of the reference.
+    NACRE_CHECK(write_graph(*sessions.front().renderer, scene.arguments().dump_graph));
     return comparison;
 }
 
