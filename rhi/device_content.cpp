@@ -70,7 +70,6 @@ Expected<void> Device::write_buffer(Buffer buffer, std::span<const std::byte> da
     if (data.empty()) return {};
     NACRE_TRY(const DeviceState::Staging staging, device.stage_upload(data.size()));
     std::memcpy(staging.buffer->mapped + staging.offset, data.data(), data.size());
-    NACRE_CHECK(device.backend->flush_mapped(*staging.buffer));
     PendingWrite write;
     write.staging = staging.buffer;
     write.staging_offset = staging.offset;
@@ -98,7 +97,6 @@ Expected<void> Device::write_texture(Texture texture, std::span<const std::byte>
                               "Give the texels without padding; mip_bytes tells how many bytes these are."});
     NACRE_TRY(const DeviceState::Staging staging, device.stage_upload(data.size()));
     std::memcpy(staging.buffer->mapped + staging.offset, data.data(), data.size());
-    NACRE_CHECK(device.backend->flush_mapped(*staging.buffer));
     PendingWrite write;
     write.staging = staging.buffer;
     write.staging_offset = staging.offset;

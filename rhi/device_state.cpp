@@ -94,7 +94,7 @@ void DeviceState::collect() {
 }
 
 Expected<DeviceState::Staging> DeviceState::stage_upload(std::uint64_t size) {
-    constexpr std::uint64_t chunk_bytes = 1024 * 1024;
+    constexpr std::uint64_t chunk_bytes = 256 * 1024;
     constexpr std::uint64_t alignment = 16;
     const std::uint64_t completed = lost ? ~std::uint64_t{0} : backend->completed_serial();
     for (StagingChunk& chunk : staging) {

@@ -780,6 +780,15 @@ void record_writes(DeviceState& device, CommandStream& stream) {
 
 /// Hands a planned submission to the backend and takes note of the result.
 Expected<std::uint64_t> DeviceState::execute(std::span<CommandStream* const> streams, bool has_writes) {
+    // Once for each chunk, and only now: a device may read a chunk from the flush on, so nothing more is written into it
+    // until the submission is complete.
+    for (const StagingChunk& chunk : staging)
+        if (has_writes && chunk.serial == 0 && chunk.used > 0)
+            if (auto flushed = backend->flush_mapped(*chunk.buffer); !flushed) {
+                note_failure(flushed.error());
+                tracker.rollback();
+                return std::unexpected(std::move(flushed).error());
+            }
     ExecutionPlan plan;
     plan.streams = streams;
     plan.batches = tracker.batches();
