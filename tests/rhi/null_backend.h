@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <string>
@@ -203,16 +204,39 @@ class NullDevice final : public rhi::BackendDevice {
             return fail(ErrorCode::out_of_memory, attempted, "'" + name + "'", "the fault was asked for");
         return {};
     }
+    static void require(bool condition) {
+        if (!condition) std::abort();
+    }
+    static std::uint64_t size(rhi::BackendBuffer* buffer) { return static_cast<NullBuffer*>(buffer)->bytes.size(); }
+    static void require_region(const rhi::BufferTextureCopy& region, std::uint64_t bytes, const rhi::TextureDesc& desc) {
+        const rhi::Extent3D extent = rhi::mip_extent(desc, region.mip);
+        require(region.mip < desc.mips && region.layer < desc.layers && region.offset.x + region.extent.width <= extent.width &&
+                region.offset.y + region.extent.height <= extent.height && region.offset.z + region.extent.depth <= extent.depth);
+        require(region.buffer_offset + std::uint64_t{region.extent.depth - 1} * region.rows_per_slice * region.bytes_per_row <= bytes);
+    }
     static std::byte* bytes(rhi::BackendBuffer* buffer) { return static_cast<NullBuffer*>(buffer)->bytes.data(); }
     static void carry_out(const rhi::CommandHeader& header, std::byte* payload) {
+        // What reaches a backend is possible; anything else is the front end's fault, and an assert is for bugs.
         if (header.type == rhi::CommandType::copy_buffer) {
             const auto& copy = *reinterpret_cast<const rhi::CopyBufferCommand*>(payload);
+            require(copy.source_offset + copy.size <= size(copy.source.object) &&
+                    copy.destination_offset + copy.size <= size(copy.destination.object));
             std::memmove(bytes(copy.destination.object) + copy.destination_offset,
                          bytes(copy.source.object) + copy.source_offset, copy.size);
         } else if (header.type == rhi::CommandType::fill_buffer) {
             const auto& fill = *reinterpret_cast<const rhi::FillBufferCommand*>(payload);
+            require(fill.offset + fill.size <= size(fill.buffer.object));
             for (std::uint64_t i = 0; i + 4 <= fill.size; i += 4)
                 std::memcpy(bytes(fill.buffer.object) + fill.offset + i, &fill.value, 4);
+        } else if (header.type == rhi::CommandType::copy_buffer_to_texture) {
+            const auto& copy = *reinterpret_cast<const rhi::CopyBufferToTextureCommand*>(payload);
+            require_region(copy.region, size(copy.source.object), copy.destination.object->desc);
+        } else if (header.type == rhi::CommandType::copy_texture_to_buffer) {
+            const auto& copy = *reinterpret_cast<const rhi::CopyTextureToBufferCommand*>(payload);
+            require_region(copy.region, size(copy.destination.object), copy.source.object->desc);
+        } else if (header.type == rhi::CommandType::begin_render_pass) {
+            const auto& pass = *reinterpret_cast<const rhi::BeginRenderPassCommand*>(payload);
+            require(pass.width > 0 && pass.height > 0 && (pass.color_count > 0 || pass.has_depth_stencil));
         }
     }
 
