@@ -56,13 +56,13 @@ Expected<void> CommandList::status() const {
 #define NACRE_RECORD \
     if (!stream_ || !stream_->status) return
 // The same, and the validator has to agree where there is one.
-#define NACRE_RECORD_IF_VALID(check)                              \
-    NACRE_RECORD;                                                 \
-    if (stream_->validator)                                       \
-        if (Check problem = stream_->validator->check) {          \
+#define NACRE_RECORD_IF_VALID(check)                                \
+    NACRE_RECORD;                                                   \
+    if (stream_->validator)                                         \
+        if (Check problem = stream_->validator->check) {            \
             stream_->status = stream_->validator->reject(*problem); \
-            return;                                               \
-        }                                                         \
+            return;                                                 \
+        }                                                           \
     static_assert(true)
 
 void CommandList::begin_render_pass(const RenderPassDesc& desc) {
@@ -303,7 +303,8 @@ void CommandList::begin_statement(std::string_view pass, std::span<const StatedA
     auto& command = stream_->append<BeginStatementCommand>(accesses.size_bytes());
     command.name = name;
     command.count = static_cast<std::uint32_t>(accesses.size());
-    if (!accesses.empty()) std::memcpy(reinterpret_cast<std::byte*>(&command + 1), accesses.data(), accesses.size_bytes());
+    if (!accesses.empty())
+        std::memcpy(reinterpret_cast<std::byte*>(&command + 1), accesses.data(), accesses.size_bytes());
 }
 
 void CommandList::end_statement() {

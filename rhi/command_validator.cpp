@@ -16,8 +16,12 @@ std::string CommandValidator::place() const {
 
 Problem CommandValidator::problem(Rule rule, const char* attempted, std::string reason, std::string remedy,
                                   const std::string& subject) const {
-    return {rule, ErrorCode::validation, attempted, subject.empty() ? place() : place() + ", " + subject,
-            std::move(reason), std::move(remedy)};
+    return {rule,
+            ErrorCode::validation,
+            attempted,
+            subject.empty() ? place() : place() + ", " + subject,
+            std::move(reason),
+            std::move(remedy)};
 }
 
 Check CommandValidator::inside(const char* attempted) const {
@@ -53,10 +57,11 @@ Check CommandValidator::check_attachment(const TextureView& view, bool depth, st
     const ViewReference complete = complete_view(view, desc);
     if (auto wrong = check_view(complete, desc, capabilities(), attempted, place() + ", " + subject)) return wrong;
     if (complete.mip_count != 1 || complete.layer_count != 1 || desc.dimension == TextureDimension::d3)
-        return problem(Rule::attachment_view, attempted,
-                       fmt::format("expected one mip of one layer of a texture that is not d3, found {} mips and {} layers",
-                                   complete.mip_count, complete.layer_count),
-                       "Use TextureView::subresource.", subject);
+        return problem(
+            Rule::attachment_view, attempted,
+            fmt::format("expected one mip of one layer of a texture that is not d3, found {} mips and {} layers",
+                        complete.mip_count, complete.layer_count),
+            "Use TextureView::subresource.", subject);
     if (!has_all(desc.usage, usage))
         return problem(Rule::attachment_usage, attempted,
                        fmt::format("expected usage {}, found {}", text_of(usage), text_of(desc.usage)),
@@ -76,8 +81,8 @@ Check CommandValidator::check_attachment(const TextureView& view, bool depth, st
     }
     if (extent.width != width_ || extent.height != height_)
         return problem(Rule::attachment_size, attempted,
-                       fmt::format("expected {}x{} as the other targets have, found {}x{}", width_, height_, extent.width,
-                                   extent.height),
+                       fmt::format("expected {}x{} as the other targets have, found {}x{}", width_, height_,
+                                   extent.width, extent.height),
                        "Use targets of one size.", subject);
     if (desc.samples != samples_)
         return problem(Rule::attachment_samples, attempted,
@@ -90,8 +95,10 @@ Check CommandValidator::check_attachment(const TextureView& view, bool depth, st
                                    complete.base_mip, complete.base_layer),
                        "Use another texture, mip or layer for one of the two.", subject);
     attachments_.push_back(key);
-    if (depth) depth_format_ = complete.format;
-    else color_formats_.push_back(complete.format);
+    if (depth)
+        depth_format_ = complete.format;
+    else
+        color_formats_.push_back(complete.format);
     return {};
 }
 
@@ -108,15 +115,17 @@ Check CommandValidator::check_resolve(const ColorAttachment& color, std::size_t 
     if (auto wrong = check_view(complete, desc, capabilities(), attempted, place() + ", " + subject)) return wrong;
     const Extent3D extent = mip_extent(desc, complete.base_mip);
     const auto wrong = [&](std::string expected, std::string found) {
-        return problem(Rule::resolve_target, attempted, fmt::format("expected {}, found {}", expected, found),
-                       "Resolve 4 samples of a float or normalized format into a color target of equal format and size.",
-                       subject);
+        return problem(
+            Rule::resolve_target, attempted, fmt::format("expected {}, found {}", expected, found),
+            "Resolve 4 samples of a float or normalized format into a color target of equal format and size.", subject);
     };
     if (source->desc.samples == 1) return wrong("a source of 4 samples", "1 sample");
     if (desc.samples != 1) return wrong("a target of 1 sample", fmt::format("{} samples", desc.samples));
-    if (info(desc.format).is_integer()) return wrong("a format that can be averaged", std::string(info(desc.format).name));
+    if (info(desc.format).is_integer())
+        return wrong("a format that can be averaged", std::string(info(desc.format).name));
     if (complete.mip_count != 1 || complete.layer_count != 1)
-        return wrong("one mip of one layer", fmt::format("{} mips and {} layers", complete.mip_count, complete.layer_count));
+        return wrong("one mip of one layer",
+                     fmt::format("{} mips and {} layers", complete.mip_count, complete.layer_count));
     if (!has_all(desc.usage, TextureUsage::color_target)) return wrong("usage color_target", text_of(desc.usage));
     if (complete.format != complete_view(color.view, source->desc).format)
         return wrong(std::string(info(source->desc.format).name), std::string(info(complete.format).name));
@@ -192,8 +201,9 @@ Check CommandValidator::set_pipeline(GraphicsPipeline pipeline) {
                         std::to_string(desc.color_targets.size()));
     for (std::size_t i = 0; i < color_formats_.size(); ++i)
         if (desc.color_targets[i].format != color_formats_[i])
-            return mismatch(fmt::format("format {} for color target {} as the pass has", info(color_formats_[i]).name, i),
-                            std::string(info(desc.color_targets[i].format).name));
+            return mismatch(
+                fmt::format("format {} for color target {} as the pass has", info(color_formats_[i]).name, i),
+                std::string(info(desc.color_targets[i].format).name));
     if (desc.depth_stencil.format != depth_format_)
         return mismatch(fmt::format("depth format {} as the pass has", info(depth_format_).name),
                         std::string(info(desc.depth_stencil.format).name));
@@ -238,11 +248,12 @@ Check CommandValidator::set_bind_group(std::uint32_t index, BindGroup group) {
 Check CommandValidator::set_push_constants(std::size_t size, std::uint32_t offset) {
     const std::uint32_t limit = std::min<std::uint32_t>(capabilities().max_push_constant_bytes, 4096);
     if (size == 0 || size % 4 != 0 || offset % 4 != 0 || offset > limit || size > limit - offset)
-        return problem(Rule::push_constants_range, "set push constants",
-                       fmt::format("expected multiples of 4 bytes within {} (max_push_constant_bytes), found {} bytes at "
-                                   "offset {}",
-                                   limit, size, offset),
-                       "Pad the structure, or move data into a uniform buffer.");
+        return problem(
+            Rule::push_constants_range, "set push constants",
+            fmt::format("expected multiples of 4 bytes within {} (max_push_constant_bytes), found {} bytes at "
+                        "offset {}",
+                        limit, size, offset),
+            "Pad the structure, or move data into a uniform buffer.");
     for (std::size_t word = offset / 4; word < (offset + size) / 4; ++word) push_constants_.set(word);
     return {};
 }
@@ -305,12 +316,13 @@ Check CommandValidator::set_viewport(const Viewport& viewport) {
     if (!finite || !(viewport.width > 0.0f) || !(viewport.height > 0.0f) || !unit(viewport.min_depth) ||
         !unit(viewport.max_depth) || viewport.width > most || viewport.height > most || std::abs(viewport.x) > most ||
         std::abs(viewport.y) > most)
-        return problem(Rule::viewport, "set viewport",
-                       fmt::format("expected a finite position and size above 0 within 32768 and depths of 0 to 1, found "
-                                   "{}x{} at {}, {} with depths {} to {}",
-                                   viewport.width, viewport.height, viewport.x, viewport.y, viewport.min_depth,
-                                   viewport.max_depth),
-                       "Correct the values; a viewport may reach beyond the target.");
+        return problem(
+            Rule::viewport, "set viewport",
+            fmt::format("expected a finite position and size above 0 within 32768 and depths of 0 to 1, found "
+                        "{}x{} at {}, {} with depths {} to {}",
+                        viewport.width, viewport.height, viewport.x, viewport.y, viewport.min_depth,
+                        viewport.max_depth),
+            "Correct the values; a viewport may reach beyond the target.");
     return {};
 }
 

@@ -13,8 +13,8 @@
 
 namespace nacre::rhi {
 
-/// Checks the calls of one command list as they are made, so that an error is told where the mistake is. One for each list
-/// of a device with validation on; the list calls it before it records a command.
+/// Checks the calls of one command list as they are made, so that an error is told where the mistake is. One for each
+/// list of a device with validation on; the list calls it before it records a command.
 ///
 /// It knows the objects by the device's tables, which it looks into under a shared lock.
 class CommandValidator {
@@ -35,7 +35,8 @@ class CommandValidator {
     Check set_pass_state(const char* attempted);
     Check draw(const DrawArguments& arguments);
     Check draw_indexed(const DrawIndexedArguments& arguments);
-    Check draw_indirect(Buffer arguments, std::uint64_t offset, std::uint32_t count, std::uint32_t stride, bool indexed);
+    Check draw_indirect(Buffer arguments, std::uint64_t offset, std::uint32_t count, std::uint32_t stride,
+                        bool indexed);
     Check dispatch(const DispatchArguments& groups);
     Check dispatch_indirect(Buffer arguments, std::uint64_t offset);
     Check copy_buffer(Buffer source, std::uint64_t source_offset, Buffer destination, std::uint64_t destination_offset,

@@ -35,7 +35,8 @@ Check CommandValidator::copy_buffer(Buffer source, std::uint64_t source_offset, 
     if (!from) return failed;
     const BufferObject* to = look_up(destination, attempted, "destination buffer", failed);
     if (!to) return failed;
-    const auto check_end = [&](const BufferObject& buffer, std::uint64_t offset, BufferUsage usage, const char* end) -> Check {
+    const auto check_end = [&](const BufferObject& buffer, std::uint64_t offset, BufferUsage usage,
+                               const char* end) -> Check {
         const std::string subject = fmt::format("{} buffer '{}'", end, buffer.desc.name);
         if (!has_all(buffer.desc.usage, usage))
             return problem(Rule::copy_usage, attempted,
@@ -43,8 +44,8 @@ Check CommandValidator::copy_buffer(Buffer source, std::uint64_t source_offset, 
                            "Add the usage where the buffer is created.", subject);
         if (offset > buffer.desc.size || size > buffer.desc.size - offset)
             return problem(Rule::copy_range, attempted,
-                           fmt::format("expected a range within {} bytes, found {} bytes from offset {}", buffer.desc.size,
-                                       size, offset),
+                           fmt::format("expected a range within {} bytes, found {} bytes from offset {}",
+                                       buffer.desc.size, size, offset),
                            "Correct offset and size.", subject);
         return {};
     };
@@ -125,12 +126,13 @@ Check CommandValidator::copy_buffer_and_texture(Buffer buffer, Texture texture, 
     const std::string subject = fmt::format("buffer '{}', texture '{}'", bytes->desc.name, desc.name);
     if (region.buffer_offset % block_bytes != 0 || region.buffer_offset % 4 != 0 ||
         region.bytes_per_row % block_bytes != 0 || region.bytes_per_row < row || region.rows_per_slice < rows)
-        return problem(Rule::copy_alignment, attempted,
-                       fmt::format("expected a buffer_offset that is a multiple of {} and 4, a bytes_per_row that is a "
-                                   "multiple of {} and at least {}, and at least {} rows_per_slice, found {}, {} and {}",
-                                   block_bytes, block_bytes, row, rows, region.buffer_offset, region.bytes_per_row,
-                                   region.rows_per_slice),
-                       "Align the rows, or leave them 0 for a tight layout.", subject);
+        return problem(
+            Rule::copy_alignment, attempted,
+            fmt::format("expected a buffer_offset that is a multiple of {} and 4, a bytes_per_row that is a "
+                        "multiple of {} and at least {}, and at least {} rows_per_slice, found {}, {} and {}",
+                        block_bytes, block_bytes, row, rows, region.buffer_offset, region.bytes_per_row,
+                        region.rows_per_slice),
+            "Align the rows, or leave them 0 for a tight layout.", subject);
     const std::uint64_t needed = region_bytes(region, desc);
     if (region.buffer_offset > bytes->desc.size || needed > bytes->desc.size - region.buffer_offset)
         return problem(Rule::copy_range, attempted,
@@ -164,8 +166,8 @@ Check CommandValidator::copy_texture(Texture source, Texture destination, const 
                        "Draw with a shader to convert between formats.",
                        fmt::format("textures '{}' and '{}'", from->desc.name, to->desc.name));
     const TextureCopy region = complete_region(wanted, from->desc);
-    if (auto wrong = check_texture_box(attempted, from->desc, region.source_mip, region.source_layer, region.layer_count,
-                                       region.source_offset, region.extent))
+    if (auto wrong = check_texture_box(attempted, from->desc, region.source_mip, region.source_layer,
+                                       region.layer_count, region.source_offset, region.extent))
         return wrong;
     if (auto wrong = check_texture_box(attempted, to->desc, region.destination_mip, region.destination_layer,
                                        region.layer_count, region.destination_offset, region.extent))
@@ -192,8 +194,8 @@ Check CommandValidator::fill_buffer(Buffer buffer, std::uint64_t offset, std::ui
                        "Add the usage where the buffer is created.", subject);
     if (offset > object->desc.size || (size != ~0ull && size > object->desc.size - offset))
         return problem(Rule::copy_range, attempted,
-                       fmt::format("expected a range within {} bytes, found {} bytes from offset {}", object->desc.size, size,
-                                   offset),
+                       fmt::format("expected a range within {} bytes, found {} bytes from offset {}", object->desc.size,
+                                   size, offset),
                        "Correct offset and size.", subject);
     if (offset % 4 != 0 || (size != ~0ull && size % 4 != 0))
         return problem(Rule::copy_alignment, attempted,
@@ -239,11 +241,12 @@ Check CommandValidator::generate_mips(Texture texture) {
                           !format.is_integer() && !format.is_depth_stencil() &&
                           capabilities().supports(desc.format, FormatSupport::filtered | FormatSupport::color_target);
     if (!possible)
-        return problem(Rule::generate_mips, attempted,
-                       fmt::format("expected usage {} and a format that the device supports as filtered and color_target, "
-                                   "found usage {} and {}",
-                                   text_of(needed), text_of(desc.usage), format.name),
-                       "Add the usage, or make the mips by a pass or on the host.", fmt::format("texture '{}'", desc.name));
+        return problem(
+            Rule::generate_mips, attempted,
+            fmt::format("expected usage {} and a format that the device supports as filtered and color_target, "
+                        "found usage {} and {}",
+                        text_of(needed), text_of(desc.usage), format.name),
+            "Add the usage, or make the mips by a pass or on the host.", fmt::format("texture '{}'", desc.name));
     return {};
 }
 

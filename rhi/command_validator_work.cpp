@@ -21,8 +21,8 @@ std::string_view name_of_kind(FormatKind kind) {
 Check CommandValidator::check_group_content(const PipelineCommon& pipeline, const BindGroupObject& group,
                                             std::uint32_t index, const char* attempted) {
     const auto subject = [&](const ReflectedBinding& declared) {
-        return fmt::format("pipeline '{}', bind group '{}' at index {}, binding {} '{}'", pipeline.name, group.name, index,
-                           declared.binding, declared.name);
+        return fmt::format("pipeline '{}', bind group '{}' at index {}, binding {} '{}'", pipeline.name, group.name,
+                           index, declared.binding, declared.name);
     };
     for (const ReflectedBinding& declared : pipeline.bindings) {
         if (declared.set != index) continue;
@@ -33,18 +33,21 @@ Check CommandValidator::check_group_content(const PipelineCommon& pipeline, cons
                                            declared.block_size, use.size),
                                "Make the buffer or the bound range larger.", subject(declared));
         for (const TextureUse& use : group.textures) {
-            if (use.binding != declared.binding || !use.slot->occupied || use.slot->generation != use.generation) continue;
+            if (use.binding != declared.binding || !use.slot->occupied || use.slot->generation != use.generation)
+                continue;
             const TextureDesc& desc = use.slot->object.desc;
             const auto wrong = [&](std::string expected, std::string found) {
                 return problem(Rule::binding_view, attempted,
-                               fmt::format("expected {} as the shader declares, found {} in texture '{}'", expected, found,
-                                           desc.name),
+                               fmt::format("expected {} as the shader declares, found {} in texture '{}'", expected,
+                                           found, desc.name),
                                "View the texture as the shader declares it, or change the shader.", subject(declared));
             };
             if (declared.dimension != ViewDimension::automatic && declared.dimension != use.dimension)
-                return wrong(fmt::format("dimension {}", name_of(declared.dimension)), std::string(name_of(use.dimension)));
+                return wrong(fmt::format("dimension {}", name_of(declared.dimension)),
+                             std::string(name_of(use.dimension)));
             if (declared.multisampled != (desc.samples > 1))
-                return wrong(declared.multisampled ? "several samples" : "1 sample", fmt::format("{} samples", desc.samples));
+                return wrong(declared.multisampled ? "several samples" : "1 sample",
+                             fmt::format("{} samples", desc.samples));
             const FormatInfo& format = info(use.format);
             if (declared.image_format != Format::undefined && declared.image_format != use.format)
                 return wrong(fmt::format("format {}", info(declared.image_format).name), std::string(format.name));
@@ -70,13 +73,13 @@ Check CommandValidator::check_groups(const PipelineCommon& pipeline, const char*
         if (!(group->layout == pipeline.layouts[index])) {
             const BindGroupLayoutObject* expected = device_->tables.layouts.find(pipeline.layouts[index]);
             const BindGroupLayoutObject* found = device_->tables.layouts.find(group->layout);
-            return problem(Rule::bind_group_layout_mismatch, attempted,
-                           fmt::format("expected a bind group of layout '{}' at index {}, found '{}' of layout '{}'",
-                                       expected ? expected->desc.name : "", index, group->name,
-                                       found ? found->desc.name : ""),
-                           "Make the group with Device::bind_group_layout(pipeline, index), or give both pipelines one "
-                           "explicit layout.",
-                           fmt::format("pipeline '{}'", pipeline.name));
+            return problem(
+                Rule::bind_group_layout_mismatch, attempted,
+                fmt::format("expected a bind group of layout '{}' at index {}, found '{}' of layout '{}'",
+                            expected ? expected->desc.name : "", index, group->name, found ? found->desc.name : ""),
+                "Make the group with Device::bind_group_layout(pipeline, index), or give both pipelines one "
+                "explicit layout.",
+                fmt::format("pipeline '{}'", pipeline.name));
         }
         if (auto wrong = check_group_content(pipeline, *group, index, attempted)) return wrong;
         checked_groups_ |= 1u << index;
@@ -121,8 +124,9 @@ Check CommandValidator::check_vertices(const GraphicsPipelineObject& pipeline, c
     for (const VertexAttribute& attribute : pipeline.desc.vertex_attributes) {
         const VertexBufferLayout& layout = pipeline.desc.vertex_buffers[attribute.buffer];
         if (layout.per_instance ? !per_instance : !per_vertex) continue;
-        const std::uint64_t count = layout.per_instance ? std::uint64_t{arguments.first_instance} + arguments.instance_count
-                                                        : std::uint64_t{arguments.first_vertex} + arguments.vertex_count;
+        const std::uint64_t count = layout.per_instance
+                                        ? std::uint64_t{arguments.first_instance} + arguments.instance_count
+                                        : std::uint64_t{arguments.first_vertex} + arguments.vertex_count;
         if (arguments.vertex_count == 0 || arguments.instance_count == 0) continue;
         Check failed;
         const BoundBuffer& bound = vertex_buffers_[attribute.buffer];
@@ -131,12 +135,13 @@ Check CommandValidator::check_vertices(const GraphicsPipelineObject& pipeline, c
         const std::uint64_t end = (count - 1) * layout.stride + attribute.offset + info(attribute.format).block_bytes;
         const std::uint64_t left = buffer->desc.size - bound.offset;
         if (end > left)
-            return problem(Rule::vertex_range, attempted,
-                           fmt::format("expected {} {} of {} bytes with attribute {} within the {} bytes of buffer '{}' from "
-                                       "offset {}, found an end at byte {}",
-                                       count, layout.per_instance ? "instances" : "vertices", layout.stride,
-                                       attribute.location, left, buffer->desc.name, bound.offset, end),
-                           "Draw less, or make the buffer larger.", subject);
+            return problem(
+                Rule::vertex_range, attempted,
+                fmt::format("expected {} {} of {} bytes with attribute {} within the {} bytes of buffer '{}' from "
+                            "offset {}, found an end at byte {}",
+                            count, layout.per_instance ? "instances" : "vertices", layout.stride, attribute.location,
+                            left, buffer->desc.name, bound.offset, end),
+                "Draw less, or make the buffer larger.", subject);
     }
     return {};
 }
@@ -187,8 +192,8 @@ Check CommandValidator::draw_indexed(const DrawIndexedArguments& arguments) {
                           {arguments.index_count, arguments.instance_count, 0, arguments.first_instance}, false, true);
 }
 
-Check CommandValidator::check_indirect(const char* attempted, Buffer arguments, std::uint64_t offset, std::uint32_t count,
-                                       std::uint32_t stride, std::uint32_t bytes) {
+Check CommandValidator::check_indirect(const char* attempted, Buffer arguments, std::uint64_t offset,
+                                       std::uint32_t count, std::uint32_t stride, std::uint32_t bytes) {
     Check failed;
     const BufferObject* buffer = look_up(arguments, attempted, "buffer", failed);
     if (!buffer) return failed;
@@ -198,17 +203,18 @@ Check CommandValidator::check_indirect(const char* attempted, Buffer arguments, 
                        fmt::format("expected usage indirect, found {}", text_of(buffer->desc.usage)),
                        "Add the usage where the buffer is created.", subject);
     if (offset % 4 != 0 || (count > 1 && (stride % 4 != 0 || stride < bytes)))
-        return problem(Rule::indirect_use, attempted,
-                       fmt::format("expected an offset that is a multiple of 4 and a stride of at least {}, found {} and {}",
-                                   bytes, offset, stride),
-                       "Correct offset and stride.", subject);
+        return problem(
+            Rule::indirect_use, attempted,
+            fmt::format("expected an offset that is a multiple of 4 and a stride of at least {}, found {} and {}",
+                        bytes, offset, stride),
+            "Correct offset and stride.", subject);
     if (count == 0) return {};
     const std::uint64_t needed = std::uint64_t{count - 1} * stride + bytes;
     if (offset > buffer->desc.size || needed > buffer->desc.size - offset)
-        return problem(Rule::indirect_range, attempted,
-                       fmt::format("expected {} bytes from offset {} within {}, found less", needed, offset,
-                                   buffer->desc.size),
-                       "Correct offset and count, or make the buffer larger.", subject);
+        return problem(
+            Rule::indirect_range, attempted,
+            fmt::format("expected {} bytes from offset {} within {}, found less", needed, offset, buffer->desc.size),
+            "Correct offset and count, or make the buffer larger.", subject);
     return {};
 }
 
@@ -233,8 +239,8 @@ Check CommandValidator::dispatch(const DispatchArguments& groups) {
     const auto& limit = capabilities().max_workgroup_count;
     if (groups.x > limit[0] || groups.y > limit[1] || groups.z > limit[2])
         return problem(Rule::dispatch_limit, attempted,
-                       fmt::format("expected at most {}x{}x{} workgroups (max_workgroup_count), found {}x{}x{}", limit[0],
-                                   limit[1], limit[2], groups.x, groups.y, groups.z),
+                       fmt::format("expected at most {}x{}x{} workgroups (max_workgroup_count), found {}x{}x{}",
+                                   limit[0], limit[1], limit[2], groups.x, groups.y, groups.z),
                        "Dispatch several times, or do more in each invocation.");
     if (!compute_)
         return problem(Rule::no_pipeline, attempted, "expected a compute pipeline, found none",

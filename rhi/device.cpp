@@ -143,7 +143,8 @@ MemoryStatistics Device::memory_statistics() const {
     statistics.buffer_bytes = statistics.texture_bytes = statistics.staging_bytes = 0;
     statistics.buffer_count = device.tables().buffers.size();
     statistics.texture_count = device.tables().textures.size();
-    device.tables().buffers.for_each([&](const BufferObject& buffer) { statistics.buffer_bytes += buffer.backend->memory_bytes; });
+    device.tables().buffers.for_each(
+        [&](const BufferObject& buffer) { statistics.buffer_bytes += buffer.backend->memory_bytes; });
     device.tables().textures.for_each(
         [&](const TextureObject& texture) { statistics.texture_bytes += texture.backend->memory_bytes; });
     for (const StagingChunk& chunk : device.staging) statistics.staging_bytes += chunk.buffer->desc.size;

@@ -54,8 +54,11 @@ class GroupBuilder {
 
   private:
     Problem problem(Rule rule, std::uint32_t binding, std::string reason, std::string remedy) const {
-        return {rule, ErrorCode::validation, "create bind group",
-                fmt::format("'{}' of layout '{}', binding {}", desc_.name, layout_.desc.name, binding), std::move(reason),
+        return {rule,
+                ErrorCode::validation,
+                "create bind group",
+                fmt::format("'{}' of layout '{}', binding {}", desc_.name, layout_.desc.name, binding),
+                std::move(reason),
                 std::move(remedy)};
     }
     Check add_buffer(const BindGroupEntry& entry, const BindingLayout& binding, BackendBinding& resolved);
@@ -70,11 +73,12 @@ class GroupBuilder {
 
 Check GroupBuilder::add(const BindGroupEntry& entry) {
     const auto& all = layout_.desc.bindings;
-    const auto at = std::lower_bound(all.begin(), all.end(), entry.binding, [](const BindingLayout& layout, std::uint32_t number) {
-        return layout.binding < number;
-    });
+    const auto at =
+        std::lower_bound(all.begin(), all.end(), entry.binding,
+                         [](const BindingLayout& layout, std::uint32_t number) { return layout.binding < number; });
     if (at == all.end() || at->binding != entry.binding)
-        return problem(Rule::group_unknown_binding, entry.binding, "expected a binding of the layout, found one that it lacks",
+        return problem(Rule::group_unknown_binding, entry.binding,
+                       "expected a binding of the layout, found one that it lacks",
                        "Remove the entry, or use the layout of the pipeline that needs it.");
     const BindingLayout& binding = *at;
     const std::uint32_t count = binding.count == 0 ? device_.capabilities().max_bindless_textures : binding.count;
@@ -90,10 +94,10 @@ Check GroupBuilder::add(const BindGroupEntry& entry) {
         if (entry.buffer) found += " buffer";
         if (entry.texture.texture) found += " texture";
         if (entry.sampler) found += " sampler";
-        return problem(Rule::group_wrong_resource, entry.binding,
-                       fmt::format("expected what a {} needs, found{}", name_of(binding.type),
-                                   found.empty() ? " nothing" : found),
-                       "Set buffer, texture or sampler of the entry as the binding's type needs them.");
+        return problem(
+            Rule::group_wrong_resource, entry.binding,
+            fmt::format("expected what a {} needs, found{}", name_of(binding.type), found.empty() ? " nothing" : found),
+            "Set buffer, texture or sampler of the entry as the binding's type needs them.");
     }
     BackendBinding resolved;
     resolved.binding = entry.binding;
@@ -127,13 +131,14 @@ Check GroupBuilder::add_buffer(const BindGroupEntry& entry, const BindingLayout&
                        fmt::format("expected buffer '{}' to have usage {}, found {}", buffer.name, text_of(needed),
                                    text_of(buffer.usage)),
                        "Add the usage where the buffer is created.");
-    const std::uint32_t alignment = uniform ? capabilities.uniform_offset_alignment : capabilities.storage_offset_alignment;
+    const std::uint32_t alignment =
+        uniform ? capabilities.uniform_offset_alignment : capabilities.storage_offset_alignment;
     if (alignment != 0 && entry.offset % alignment != 0)
-        return problem(Rule::group_alignment, entry.binding,
-                       fmt::format("expected an offset into buffer '{}' that is a multiple of {} ({}), found {}", buffer.name,
-                                   alignment, uniform ? "uniform_offset_alignment" : "storage_offset_alignment",
-                                   entry.offset),
-                       "Align the offset.");
+        return problem(
+            Rule::group_alignment, entry.binding,
+            fmt::format("expected an offset into buffer '{}' that is a multiple of {} ({}), found {}", buffer.name,
+                        alignment, uniform ? "uniform_offset_alignment" : "storage_offset_alignment", entry.offset),
+            "Align the offset.");
     if (entry.offset >= buffer.size)
         return problem(Rule::group_range, entry.binding,
                        fmt::format("expected an offset below the {} bytes of buffer '{}', found {}", buffer.size,
@@ -148,14 +153,16 @@ Check GroupBuilder::add_buffer(const BindGroupEntry& entry, const BindingLayout&
                        "Correct offset and size.");
     const std::uint64_t limit = uniform ? capabilities.max_uniform_buffer_range : capabilities.max_storage_buffer_range;
     if (size > limit)
-        return problem(Rule::group_range_limit, entry.binding,
-                       fmt::format("expected at most {} bytes ({}), found {} of buffer '{}'", limit,
-                                   uniform ? "max_uniform_buffer_range" : "max_storage_buffer_range", size, buffer.name),
-                       "Bind a smaller range.");
+        return problem(
+            Rule::group_range_limit, entry.binding,
+            fmt::format("expected at most {} bytes ({}), found {} of buffer '{}'", limit,
+                        uniform ? "max_uniform_buffer_range" : "max_storage_buffer_range", size, buffer.name),
+            "Bind a smaller range.");
     resolved.buffer = slot->object.backend.get();
     resolved.offset = entry.offset;
     resolved.size = size;
-    object.buffers.push_back({slot, slot->generation, entry.binding, {use_of(binding.type), binding.stages}, entry.offset, size});
+    object.buffers.push_back(
+        {slot, slot->generation, entry.binding, {use_of(binding.type), binding.stages}, entry.offset, size});
     return {};
 }
 
@@ -180,13 +187,15 @@ Check GroupBuilder::add_texture(const BindGroupEntry& entry, const BindingLayout
                                   fmt::format("'{}', binding {}", desc_.name, entry.binding)))
         return failed;
     const ViewReference own = complete_view(TextureView(entry.texture.texture), texture);
-    if (!image && !capabilities.texture_views && (view.dimension != own.dimension || view.layer_count != own.layer_count))
-        return problem(Rule::view_dimension, entry.binding,
-                       fmt::format("expected all {} layers of texture '{}' as {} on a device without texture_views, found {} "
-                                   "layers as {}",
-                                   own.layer_count, texture.name, name_of(own.dimension), view.layer_count,
-                                   name_of(view.dimension)),
-                       "Sample the whole texture, and choose the layer in the shader.");
+    if (!image && !capabilities.texture_views &&
+        (view.dimension != own.dimension || view.layer_count != own.layer_count))
+        return problem(
+            Rule::view_dimension, entry.binding,
+            fmt::format("expected all {} layers of texture '{}' as {} on a device without texture_views, found {} "
+                        "layers as {}",
+                        own.layer_count, texture.name, name_of(own.dimension), view.layer_count,
+                        name_of(view.dimension)),
+            "Sample the whole texture, and choose the layer in the shader.");
     if (image && (view.mip_count != 1 || texture.samples != 1))
         return problem(Rule::group_storage_view, entry.binding,
                        fmt::format("expected one mip of a texture of 1 sample, found {} mips of '{}' with {} samples",
@@ -195,14 +204,19 @@ Check GroupBuilder::add_texture(const BindGroupEntry& entry, const BindingLayout
     if (sampler && texture.samples == 1 && !capabilities.supports(view.format, FormatSupport::filtered) &&
         (sampler->magnify == Filter::linear || sampler->minify == Filter::linear ||
          (sampler->mip == Filter::linear && view.mip_count > 1)))
-        return problem(Rule::group_unfilterable, entry.binding,
-                       fmt::format("expected nearest filters for format {} of texture '{}', found linear in sampler '{}'",
-                                   info(view.format).name, texture.name, sampler->name),
-                       "Set magnify, minify and mip to Filter::nearest.");
+        return problem(
+            Rule::group_unfilterable, entry.binding,
+            fmt::format("expected nearest filters for format {} of texture '{}', found linear in sampler '{}'",
+                        info(view.format).name, texture.name, sampler->name),
+            "Set magnify, minify and mip to Filter::nearest.");
     view.texture.object = slot->object.backend.get();
     resolved.view = view;
-    object.textures.push_back({slot, slot->generation, entry.binding, {use_of(binding.type), binding.stages},
-                               {view.base_mip, view.mip_count, view.base_layer, view.layer_count}, view.dimension,
+    object.textures.push_back({slot,
+                               slot->generation,
+                               entry.binding,
+                               {use_of(binding.type), binding.stages},
+                               {view.base_mip, view.mip_count, view.base_layer, view.layer_count},
+                               view.dimension,
                                view.format});
     return {};
 }
@@ -239,8 +253,8 @@ Expected<BindGroup> Device::create_bind_group(const BindGroupDesc& desc) {
     ObjectTables& tables = device.tables();
     BindGroupLayoutObject* layout = tables.layouts.find(desc.layout);
     if (!layout)
-        return device.reject(handle_problem(tables.layouts, desc.layout, "create bind group '" + desc.name + "'",
-                                            "bind group layout"));
+        return device.reject(
+            handle_problem(tables.layouts, desc.layout, "create bind group '" + desc.name + "'", "bind group layout"));
     GroupBuilder builder(device, desc, *layout);
     builder.bindings.reserve(desc.entries.size());
     for (const BindGroupEntry& entry : desc.entries)
@@ -260,8 +274,8 @@ Expected<BindGroup> Device::create_bind_group(const BindGroupDesc& desc) {
     const std::unique_lock tables_lock(device.shared->tables_mutex);
     const BindGroup handle = tables.groups.insert(std::move(object));
     if (!handle)
-        return fail(ErrorCode::out_of_memory, "create bind group", "'" + desc.name + "'", "16 million bind groups exist",
-                    "Destroy bind groups that are no longer used.");
+        return fail(ErrorCode::out_of_memory, "create bind group", "'" + desc.name + "'",
+                    "16 million bind groups exist", "Destroy bind groups that are no longer used.");
     return handle;
 }
 

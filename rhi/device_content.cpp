@@ -15,7 +15,10 @@ constexpr std::uint64_t most_pending_bytes = 64 * 1024 * 1024;
 
 Problem range_problem(const char* attempted, const std::string& name, std::uint64_t offset, std::uint64_t size,
                       std::uint64_t bytes) {
-    return {Rule::content_range, ErrorCode::invalid_argument, attempted, "buffer '" + name + "'",
+    return {Rule::content_range,
+            ErrorCode::invalid_argument,
+            attempted,
+            "buffer '" + name + "'",
             fmt::format("expected a range within {} bytes, found {} bytes from offset {}", bytes, size, offset),
             "Correct offset and size."};
 }
@@ -23,12 +26,18 @@ Problem range_problem(const char* attempted, const std::string& name, std::uint6
 Check check_part(const char* attempted, const TextureDesc& desc, std::uint32_t mip, std::uint32_t layer,
                  TextureUsage needed) {
     if (mip >= desc.mips || layer >= layers_of(desc))
-        return Problem{Rule::content_range, ErrorCode::invalid_argument, attempted, "texture '" + desc.name + "'",
+        return Problem{Rule::content_range,
+                       ErrorCode::invalid_argument,
+                       attempted,
+                       "texture '" + desc.name + "'",
                        fmt::format("expected a mip below {} and a layer below {}, found mip {} of layer {}", desc.mips,
                                    layers_of(desc), mip, layer),
                        "Name a part that the texture has."};
     if (!has_all(desc.usage, needed))
-        return Problem{Rule::content_usage, ErrorCode::invalid_argument, attempted, "texture '" + desc.name + "'",
+        return Problem{Rule::content_usage,
+                       ErrorCode::invalid_argument,
+                       attempted,
+                       "texture '" + desc.name + "'",
                        fmt::format("expected usage {}, found {}", text_of(needed), text_of(desc.usage)),
                        "Add the usage where the texture is created."};
     return {};
@@ -92,9 +101,10 @@ Expected<void> Device::write_texture(Texture texture, std::span<const std::byte>
     if (Check failed = check_part("write texture", desc, mip, layer, TextureUsage::copy_destination))
         return device.reject(std::move(*failed));
     if (data.size() != mip_bytes(desc, mip))
-        return device.reject({Rule::content_size, ErrorCode::invalid_argument, "write texture", "'" + desc.name + "'",
-                              fmt::format("expected {} bytes for mip {}, found {}", mip_bytes(desc, mip), mip, data.size()),
-                              "Give the texels without padding; mip_bytes tells how many bytes these are."});
+        return device.reject(
+            {Rule::content_size, ErrorCode::invalid_argument, "write texture", "'" + desc.name + "'",
+             fmt::format("expected {} bytes for mip {}, found {}", mip_bytes(desc, mip), mip, data.size()),
+             "Give the texels without padding; mip_bytes tells how many bytes these are."});
     NACRE_TRY(const DeviceState::Staging staging, device.stage_upload(data.size()));
     std::memcpy(staging.buffer->mapped + staging.offset, data.data(), data.size());
     PendingWrite write;
@@ -193,8 +203,8 @@ Expected<std::span<std::byte>> Device::map(Buffer buffer) {
     BufferObject* object = device.tables().buffers.find(buffer);
     if (!object) return device.reject(handle_problem(device.tables().buffers, buffer, "map buffer", "buffer"));
     if (object->desc.memory == MemoryKind::device)
-        return device.reject({Rule::map_memory, ErrorCode::invalid_argument, "map buffer", "'" + object->desc.name + "'",
-                              "expected upload or readback memory, found device memory",
+        return device.reject({Rule::map_memory, ErrorCode::invalid_argument, "map buffer",
+                              "'" + object->desc.name + "'", "expected upload or readback memory, found device memory",
                               "Use write_buffer and read_buffer, or another MemoryKind."});
     if (object->is_mapped)
         return device.reject({Rule::map_state, ErrorCode::invalid_argument, "map buffer", "'" + object->desc.name + "'",
@@ -217,8 +227,9 @@ Expected<void> Device::unmap(Buffer buffer) {
     BufferObject* object = device.tables().buffers.find(buffer);
     if (!object) return device.reject(handle_problem(device.tables().buffers, buffer, "unmap buffer", "buffer"));
     if (!object->is_mapped)
-        return device.reject({Rule::map_state, ErrorCode::invalid_argument, "unmap buffer", "'" + object->desc.name + "'",
-                              "expected a buffer that is mapped, found it unmapped", "Pair map and unmap."});
+        return device.reject({Rule::map_state, ErrorCode::invalid_argument, "unmap buffer",
+                              "'" + object->desc.name + "'", "expected a buffer that is mapped, found it unmapped",
+                              "Pair map and unmap."});
     object->is_mapped = false;
     --device.mapped_buffers;
     if (object->desc.memory == MemoryKind::readback) return {};
@@ -237,15 +248,16 @@ Expected<std::vector<std::uint64_t>> Device::read_queries(QueryPool pool, std::u
         if (!object)
             return device.reject(handle_problem(device.tables().query_pools, pool, "read queries", "query pool"));
         if (first > object->desc.count || count > object->desc.count - first)
-            return device.reject({Rule::query_range, ErrorCode::invalid_argument, "read queries", "'" + object->desc.name + "'",
-                                  fmt::format("expected queries below {}, found {} from {}", object->desc.count, count, first),
-                                  "Correct first and count."});
+            return device.reject(
+                {Rule::query_range, ErrorCode::invalid_argument, "read queries", "'" + object->desc.name + "'",
+                 fmt::format("expected queries below {}, found {} from {}", object->desc.count, count, first),
+                 "Correct first and count."});
         for (std::uint32_t i = first; i < first + count; ++i)
             if (!object->written[i])
-                return device.reject({Rule::query_unwritten, ErrorCode::invalid_argument, "read queries",
-                                      "'" + object->desc.name + "'",
-                                      fmt::format("expected a query that submitted work has written, found {} unwritten", i),
-                                      "Submit the commands that write it first."});
+                return device.reject(
+                    {Rule::query_unwritten, ErrorCode::invalid_argument, "read queries", "'" + object->desc.name + "'",
+                     fmt::format("expected a query that submitted work has written, found {} unwritten", i),
+                     "Submit the commands that write it first."});
         if (count == 0) return std::vector<std::uint64_t>{};
         serial = object->last_serial;
     }

@@ -152,7 +152,8 @@ Expected<Shader> Device::create_shader(const ShaderDesc& desc) {
                               "expected one stage (vertex, fragment or compute), found " + text_of(desc.stage),
                               "Set ShaderDesc::stage to the stage of the entry point."});
     NACRE_TRY(ShaderReflection reflection, reflect(desc.spirv, desc.stage, desc.entry_point, desc.name));
-    if (Check failed = check_shader(reflection, desc.name, device.capabilities())) return device.reject(std::move(*failed));
+    if (Check failed = check_shader(reflection, desc.name, device.capabilities()))
+        return device.reject(std::move(*failed));
     const std::lock_guard lock(device.mutex);
     auto made = device.backend->create_shader(desc, reflection);
     if (!made) return backend_failure(device, made);
@@ -214,7 +215,9 @@ void Device::destroy(Texture object) { destroy_object(*state_, object, "destroy"
 void Device::destroy(Sampler object) { destroy_object(*state_, object, "destroy", "sampler", true); }
 void Device::destroy(Shader object) { destroy_object(*state_, object, "destroy", "shader", false); }
 void Device::destroy(BindGroup object) { destroy_object(*state_, object, "destroy", "bind group", false); }
-void Device::destroy(GraphicsPipeline object) { destroy_object(*state_, object, "destroy", "graphics pipeline", false); }
+void Device::destroy(GraphicsPipeline object) {
+    destroy_object(*state_, object, "destroy", "graphics pipeline", false);
+}
 void Device::destroy(ComputePipeline object) { destroy_object(*state_, object, "destroy", "compute pipeline", false); }
 void Device::destroy(QueryPool object) { destroy_object(*state_, object, "destroy", "query pool", false); }
 

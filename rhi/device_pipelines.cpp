@@ -11,7 +11,8 @@ namespace {
 
 /// Layouts for every bind-group index up to the highest that is used or given.
 Expected<std::vector<BindGroupLayout>> pipeline_layouts(DeviceState& device, const MergedInterface& merged,
-                                                        std::span<const BindGroupLayout> given, const std::string& name) {
+                                                        std::span<const BindGroupLayout> given,
+                                                        const std::string& name) {
     ObjectTables& tables = device.tables();
     std::uint32_t count = static_cast<std::uint32_t>(given.size());
     for (const MergedBinding& binding : merged.bindings) count = std::max(count, binding.declared.set + 1);
@@ -26,17 +27,18 @@ Expected<std::vector<BindGroupLayout>> pipeline_layouts(DeviceState& device, con
         if (set < given.size() && given[set]) {
             const BindGroupLayoutObject* layout = tables.layouts.find(given[set]);
             if (!layout)
-                return device.reject(handle_problem(tables.layouts, given[set], "create pipeline '" + name + "'",
-                                                    "bind group layout"));
-            if (Check failed = check_explicit_layout(layout->desc, set, merged, name)) return device.reject(std::move(*failed));
+                return device.reject(
+                    handle_problem(tables.layouts, given[set], "create pipeline '" + name + "'", "bind group layout"));
+            if (Check failed = check_explicit_layout(layout->desc, set, merged, name))
+                return device.reject(std::move(*failed));
             layouts.push_back(given[set]);
         } else {
             BindGroupLayoutDesc desc;
             desc.name = fmt::format("{}, set {}", name, set);
             for (const MergedBinding& binding : merged.bindings)
                 if (binding.declared.set == set)
-                    desc.bindings.push_back({binding.declared.binding, binding.declared.type, binding.declared.count,
-                                             binding.stages});
+                    desc.bindings.push_back(
+                        {binding.declared.binding, binding.declared.type, binding.declared.count, binding.stages});
             if (Check failed = check_layout(desc, device.capabilities())) return device.reject(std::move(*failed));
             NACRE_TRY(const BindGroupLayout layout, device.layout_of(std::move(desc)));
             layouts.push_back(layout);
@@ -83,7 +85,8 @@ Expected<BindGroupLayout> layout_at(const DeviceState& device, HandleType pipeli
         return device.shared->messages.reject(handle_problem(table, pipeline, "get bind group layout", "pipeline"));
     if (index >= found->common.layouts.size())
         return device.shared->messages.reject(
-            {Rule::bind_group_index, ErrorCode::invalid_argument, "get bind group layout", "'" + found->common.name + "'",
+            {Rule::bind_group_index, ErrorCode::invalid_argument, "get bind group layout",
+             "'" + found->common.name + "'",
              fmt::format("expected an index below {}, found {}", found->common.layouts.size(), index),
              "Ask for an index that the pipeline's shaders use."});
     return found->common.layouts[index];
@@ -102,10 +105,11 @@ Expected<GraphicsPipeline> Device::create_graphics_pipeline(const GraphicsPipeli
     const ShaderObject* fragment = nullptr;
     if (desc.fragment) {
         fragment = tables.shaders.find(desc.fragment);
-        if (!fragment) return device.reject(handle_problem(tables.shaders, desc.fragment, attempted, "fragment shader"));
+        if (!fragment)
+            return device.reject(handle_problem(tables.shaders, desc.fragment, attempted, "fragment shader"));
     }
-    if (Check failed = check_graphics(desc, *vertex->backend, fragment ? fragment->backend.get() : nullptr,
-                                      device.capabilities()))
+    if (Check failed =
+            check_graphics(desc, *vertex->backend, fragment ? fragment->backend.get() : nullptr, device.capabilities()))
         return device.reject(std::move(*failed));
     std::vector<std::shared_ptr<BackendShader>> kept{vertex->backend};
     if (fragment) kept.push_back(fragment->backend);
@@ -113,8 +117,10 @@ Expected<GraphicsPipeline> Device::create_graphics_pipeline(const GraphicsPipeli
     for (const auto& shader : kept) shaders.push_back(shader.get());
     MergedInterface merged;
     if (Check failed = merge_stages(shaders, desc.name, merged)) return device.reject(std::move(*failed));
-    if (Check failed = check_specialization(desc.specialization, shaders, desc.name)) return device.reject(std::move(*failed));
-    NACRE_TRY(std::vector<BindGroupLayout> layouts, pipeline_layouts(device, merged, desc.bind_group_layouts, desc.name));
+    if (Check failed = check_specialization(desc.specialization, shaders, desc.name))
+        return device.reject(std::move(*failed));
+    NACRE_TRY(std::vector<BindGroupLayout> layouts,
+              pipeline_layouts(device, merged, desc.bind_group_layouts, desc.name));
 
     const std::vector<BackendBindGroupLayout*> backend_list = backend_layouts(device, layouts);
     BackendGraphicsPipelineDesc wanted;
@@ -137,8 +143,9 @@ Expected<GraphicsPipeline> Device::create_graphics_pipeline(const GraphicsPipeli
     for (const VertexAttribute& attribute : desc.vertex_attributes) object.vertex_buffer_mask |= 1u << attribute.buffer;
     const DepthStencilState& depth = desc.depth_stencil;
     const auto writes_stencil = [](const StencilFace& face) {
-        return face.write_mask != 0 && (face.fail != StencilOperation::keep || face.depth_fail != StencilOperation::keep ||
-                                        face.pass != StencilOperation::keep);
+        return face.write_mask != 0 &&
+               (face.fail != StencilOperation::keep || face.depth_fail != StencilOperation::keep ||
+                face.pass != StencilOperation::keep);
     };
     object.writes_depth = (depth.depth_test && depth.depth_write) ||
                           (depth.stencil_test && (writes_stencil(depth.front) || writes_stencil(depth.back)));
@@ -155,14 +162,16 @@ Expected<ComputePipeline> Device::create_compute_pipeline(const ComputePipelineD
     if (!shader)
         return device.reject(handle_problem(tables.shaders, desc.shader, "create compute pipeline '" + desc.name + "'",
                                             "compute shader"));
-    if (Check failed = check_compute(desc, *shader->backend, device.capabilities())) return device.reject(std::move(*failed));
+    if (Check failed = check_compute(desc, *shader->backend, device.capabilities()))
+        return device.reject(std::move(*failed));
     const std::shared_ptr<BackendShader> kept = shader->backend;
     const BackendShader* one = kept.get();
     MergedInterface merged;
     if (Check failed = merge_stages(std::span(&one, 1), desc.name, merged)) return device.reject(std::move(*failed));
     if (Check failed = check_specialization(desc.specialization, std::span(&one, 1), desc.name))
         return device.reject(std::move(*failed));
-    NACRE_TRY(std::vector<BindGroupLayout> layouts, pipeline_layouts(device, merged, desc.bind_group_layouts, desc.name));
+    NACRE_TRY(std::vector<BindGroupLayout> layouts,
+              pipeline_layouts(device, merged, desc.bind_group_layouts, desc.name));
 
     const std::vector<BackendBindGroupLayout*> backend_list = backend_layouts(device, layouts);
     BackendComputePipelineDesc wanted;

@@ -21,10 +21,10 @@
 /// What a device is made of, for the front end's own files.
 ///
 /// Two locks. `DeviceState::mutex` orders all calls of the backend and everything that changes state. The tables of
-/// objects are changed under that lock and `DeviceShared::tables_mutex` together, so that whoever holds either may look:
-/// a submission holds the first, the validation of a recording thread takes the second, shared, and never waits for a
-/// pipeline that is being compiled. Locks are taken in this order; messages are given under neither of them
-/// where that can be avoided, and the callback may not call the device.
+/// objects are changed under that lock and `DeviceShared::tables_mutex` together, so that whoever holds either may
+/// look: a submission holds the first, the validation of a recording thread takes the second, shared, and never waits
+/// for a pipeline that is being compiled. Locks are taken in this order; messages are given under neither of them where
+/// that can be avoided, and the callback may not call the device.
 
 namespace nacre::rhi {
 
@@ -58,8 +58,15 @@ class StreamPool {
 /// All objects of a device by handle.
 struct ObjectTables {
     explicit ObjectTables(std::uint16_t device)
-        : buffers(device), textures(device), samplers(device), shaders(device), layouts(device), groups(device),
-          graphics_pipelines(device), compute_pipelines(device), query_pools(device) {}
+        : buffers(device),
+          textures(device),
+          samplers(device),
+          shaders(device),
+          layouts(device),
+          groups(device),
+          graphics_pipelines(device),
+          compute_pipelines(device),
+          query_pools(device) {}
     SlotTable<Buffer, BufferObject> buffers;
     SlotTable<Texture, TextureObject> textures;
     SlotTable<Sampler, SamplerObject> samplers;
@@ -140,7 +147,7 @@ struct DeviceState {
 
     mutable std::mutex mutex;
     std::uint64_t submitted_serial = 0;
-    std::uint64_t destructions = 1;       ///< Resources destroyed so far, for BindGroupObject::checked_epoch.
+    std::uint64_t destructions = 1;  ///< Resources destroyed so far, for BindGroupObject::checked_epoch.
     std::deque<RetiredObject> retired;
     StateTracker tracker;
     std::unordered_map<std::string, BindGroupLayout> layouts_by_content;
@@ -169,7 +176,8 @@ struct DeviceState {
         std::uint64_t offset = 0;
     };
     Expected<Staging> stage_upload(std::uint64_t size);
-    /// Hands lists to the device, behind the content writes that wait where `consume_writes` is set. Returns the serial.
+    /// Hands lists to the device, behind the content writes that wait where `consume_writes` is set. Returns the
+    /// serial.
     Expected<std::uint64_t> submit_streams(std::span<CommandStream* const> streams, bool consume_writes);
     /// The layout of this content; its bindings are checked and sorted.
     Expected<BindGroupLayout> layout_of(BindGroupLayoutDesc sorted);
@@ -192,8 +200,8 @@ Problem handle_problem(const Table& table, HandleType handle, std::string attemp
         problem.remedy = "Create the object first, and check the result of its creation.";
     } else if (handle.device != table.device()) {
         problem.rule = Rule::foreign_handle;
-        problem.reason = "expected an object of device " + std::to_string(table.device()) +
-                         ", found one of device " + std::to_string(handle.device);
+        problem.reason = "expected an object of device " + std::to_string(table.device()) + ", found one of device " +
+                         std::to_string(handle.device);
         problem.remedy = "Objects cannot be shared between devices; create one for each.";
     } else {
         const std::string name = table.stale_name(handle);

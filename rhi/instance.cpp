@@ -36,7 +36,8 @@ Expected<BackendSpec> BackendSpec::parse(std::string_view text) {
         const std::string_view word = text.substr(at, end - at);
         if (part == 0) {
             if (!is_word(word))
-                return spec_error(text, fmt::format("expected a name of lower-case letters, digits, '-' and '_', found '{}'", word));
+                return spec_error(
+                    text, fmt::format("expected a name of lower-case letters, digits, '-' and '_', found '{}'", word));
             spec.name = word;
         } else if (const std::size_t equals = word.find('='); equals != std::string_view::npos) {
             const std::string_view option = word.substr(0, equals);
@@ -46,12 +47,14 @@ Expected<BackendSpec> BackendSpec::parse(std::string_view text) {
             if (error != std::errc{} || stop != digits.data() + digits.size() || value == 0)
                 return spec_error(text, fmt::format("expected a number above 0 for '{}', found '{}'", option, digits));
             std::uint32_t* target = option == "lanes" ? &spec.lanes : option == "threads" ? &spec.threads : nullptr;
-            if (!target) return spec_error(text, fmt::format("expected the options lanes or threads, found '{}'", option));
+            if (!target)
+                return spec_error(text, fmt::format("expected the options lanes or threads, found '{}'", option));
             if (*target != 0) return spec_error(text, fmt::format("expected '{}' once, found it twice", option));
             *target = value;
         } else {
             if (part != 1 || !is_word(word))
-                return spec_error(text, fmt::format("expected a mode or an option 'name=number' after the name, found '{}'", word));
+                return spec_error(
+                    text, fmt::format("expected a mode or an option 'name=number' after the name, found '{}'", word));
             spec.mode = word;
         }
         if (end == text.size()) break;
@@ -94,7 +97,8 @@ std::vector<UnavailableBackend> Instance::unavailable() const {
     std::vector<UnavailableBackend> all;
     for (const auto& backend : state_->backends) {
         auto found = backend->adapters();
-        if (!found) all.push_back({std::string(backend->name()), found.error()});
+        if (!found)
+            all.push_back({std::string(backend->name()), found.error()});
         else if (found->empty())
             all.push_back({std::string(backend->name()),
                            Error{ErrorCode::not_found, "list devices", "'" + std::string(backend->name()) + "'",
@@ -113,16 +117,16 @@ Expected<std::unique_ptr<Device>> Instance::create_device(const DeviceDesc& desc
     NACRE_TRY(const BackendSpec spec, BackendSpec::parse(desc.backend));
     const auto attempt = [&](Backend& backend, const BackendSpec& wanted) -> Expected<std::unique_ptr<Device>> {
         const auto modes = backend.modes();
-        const bool known = wanted.mode.empty() || std::any_of(modes.begin(), modes.end(), [&](const Backend::Mode& mode) {
-            return mode.name == wanted.mode;
-        });
+        const bool known =
+            wanted.mode.empty() || std::any_of(modes.begin(), modes.end(),
+                                               [&](const Backend::Mode& mode) { return mode.name == wanted.mode; });
         if (!known) {
             std::string names;
             for (const Backend::Mode& mode : modes)
                 if (!mode.name.empty()) names += fmt::format("{}'{}'", names.empty() ? "" : ", ", mode.name);
             return fail(ErrorCode::invalid_argument, "create device", "'" + desc.backend + "'",
-                        fmt::format("expected {}, found mode '{}'", names.empty() ? "no mode" : "one of the modes " + names,
-                                    wanted.mode),
+                        fmt::format("expected {}, found mode '{}'",
+                                    names.empty() ? "no mode" : "one of the modes " + names, wanted.mode),
                         "Leave the mode out for the default.");
         }
         const auto option = [&](const char* name) {
@@ -146,8 +150,8 @@ Expected<std::unique_ptr<Device>> Instance::create_device(const DeviceDesc& desc
         NACRE_TRY(state->backend, backend.create_device(backend_desc));
         state->adapter = state->backend->adapter();
         state->shared->capabilities = state->backend->capabilities();
-        // Some drivers have textures of three 32-bit channels; this interface has them as vertex attributes alone, and what
-        // the capabilities say must be what `create_texture` takes.
+        // Some drivers have textures of three 32-bit channels; this interface has them as vertex attributes alone, and
+        // what the capabilities say must be what `create_texture` takes.
         for (std::uint32_t i = 0; i < format_count; ++i) {
             FormatSupport& support = state->shared->capabilities.formats[i];
             if (info(static_cast<Format>(i)).block_bytes == 12)
@@ -178,7 +182,8 @@ Expected<std::unique_ptr<Device>> Instance::create_device(const DeviceDesc& desc
         wanted.name = backend->name();
         auto device = attempt(*backend, wanted);
         if (device) return device;
-        log_message(LogLevel::debug, fmt::format("backend '{}' is left out: {}", backend->name(), device.error().message()));
+        log_message(LogLevel::debug,
+                    fmt::format("backend '{}' is left out: {}", backend->name(), device.error().message()));
         reasons += fmt::format("{}{}: {}", reasons.empty() ? "" : "; ", backend->name(), device.error().message());
     }
     return fail(ErrorCode::not_found, "create device", "'auto'",

@@ -74,8 +74,8 @@ Check check_buffer(const BufferDesc& desc, const Capabilities& capabilities) {
     const std::uint64_t limit = capabilities.max_buffer_size ? capabilities.max_buffer_size : largest_resource_bytes;
     if (desc.size > limit)
         return problem(Rule::buffer_size, ErrorCode::out_of_memory,
-                       fmt::format("expected at most {} bytes (max_buffer_size; the largest heap has {}), found {}", limit,
-                                   capabilities.device_memory_bytes, desc.size),
+                       fmt::format("expected at most {} bytes (max_buffer_size; the largest heap has {}), found {}",
+                                   limit, capabilities.device_memory_bytes, desc.size),
                        "Split the buffer.");
     if (desc.usage == BufferUsage::none)
         return problem(Rule::buffer_usage, ErrorCode::invalid_argument, "expected at least one usage, found none",
@@ -101,17 +101,19 @@ Check check_texture(const TextureDesc& desc, const Capabilities& capabilities) {
     if (format.block_bytes == 0 || format.block_bytes == 12)
         return problem(Rule::texture_format, invalid,
                        fmt::format("expected a format that textures can have, found {}", format.name),
-                       format.block_bytes == 12 ? "Three-channel 32-bit formats are for vertex attributes; use four channels."
-                                                : "Set TextureDesc::format.");
+                       format.block_bytes == 12
+                           ? "Three-channel 32-bit formats are for vertex attributes; use four channels."
+                           : "Set TextureDesc::format.");
     if (desc.usage == TextureUsage::none)
         return problem(Rule::texture_usage, invalid, "expected at least one usage, found none",
                        "State in TextureDesc::usage what the texture is for.");
 
     // Size and shape.
     if (desc.width == 0 || desc.height == 0 || desc.depth == 0)
-        return problem(Rule::texture_size, invalid,
-                       fmt::format("expected a size of at least 1x1x1, found {}x{}x{}", desc.width, desc.height, desc.depth),
-                       "Skip the work where a size is 0, as for a minimized window.");
+        return problem(
+            Rule::texture_size, invalid,
+            fmt::format("expected a size of at least 1x1x1, found {}x{}x{}", desc.width, desc.height, desc.depth),
+            "Skip the work where a size is 0, as for a minimized window.");
     std::uint32_t limit = 0;
     const char* limit_name = "";
     switch (desc.dimension) {
@@ -147,9 +149,10 @@ Check check_texture(const TextureDesc& desc, const Capabilities& capabilities) {
                                    capabilities.max_texture_layers, desc.layers),
                        "Use several textures.");
     if (desc.dimension == TextureDimension::cube && desc.layers > 6 && !capabilities.cube_arrays)
-        return problem(Rule::texture_layers, ErrorCode::unsupported,
-                       fmt::format("expected 6 layers, the device has no cube arrays (cube_arrays), found {}", desc.layers),
-                       "Use one texture for each cube.");
+        return problem(
+            Rule::texture_layers, ErrorCode::unsupported,
+            fmt::format("expected 6 layers, the device has no cube arrays (cube_arrays), found {}", desc.layers),
+            "Use one texture for each cube.");
     if (format.is_compressed() && desc.dimension != TextureDimension::d2 && desc.dimension != TextureDimension::cube)
         return shape("a d2 or cube texture for a block-compressed format");
     const std::uint32_t full = full_mip_count(desc.width, desc.height, desc.depth);
@@ -168,9 +171,9 @@ Check check_texture(const TextureDesc& desc, const Capabilities& capabilities) {
     if (desc.samples > 1) {
         const std::uint32_t most = format.is_integer() ? capabilities.max_integer_samples : capabilities.max_samples;
         if (desc.samples > most || !capabilities.supports(desc.format, FormatSupport::multisampled))
-            return samples_problem(fmt::format("at most {} samples for {} (max_samples, max_integer_samples, multisampled)",
-                                               capabilities.supports(desc.format, FormatSupport::multisampled) ? most : 1,
-                                               format.name));
+            return samples_problem(
+                fmt::format("at most {} samples for {} (max_samples, max_integer_samples, multisampled)",
+                            capabilities.supports(desc.format, FormatSupport::multisampled) ? most : 1, format.name));
         if (desc.dimension != TextureDimension::d2 || desc.mips != 1 || desc.layers != 1)
             return samples_problem("1 sample for a texture with mips or layers, or that is not d2");
         if (has_any(desc.usage, TextureUsage::storage | TextureUsage::copy_source | TextureUsage::copy_destination))
@@ -191,9 +194,10 @@ Check check_texture(const TextureDesc& desc, const Capabilities& capabilities) {
     };
     for (const Need& need : needs)
         if (has_any(desc.usage, need.usage) && !capabilities.supports(desc.format, need.support))
-            return problem(Rule::texture_format_usage, ErrorCode::unsupported,
-                           fmt::format("expected a format that the device supports as {}, found {}", need.name, format.name),
-                           "Ask Capabilities::supports first and choose another format.");
+            return problem(
+                Rule::texture_format_usage, ErrorCode::unsupported,
+                fmt::format("expected a format that the device supports as {}, found {}", need.name, format.name),
+                "Ask Capabilities::supports first and choose another format.");
     if (capabilities.format_support(desc.format) == FormatSupport::none)
         return problem(Rule::texture_format_usage, ErrorCode::unsupported,
                        fmt::format("expected a format that the device has, found {}", format.name),
@@ -209,13 +213,15 @@ Check check_texture(const TextureDesc& desc, const Capabilities& capabilities) {
         }
         bytes += one;
     }
-    const std::uint64_t most = capabilities.device_memory_bytes ? capabilities.device_memory_bytes : largest_resource_bytes;
+    const std::uint64_t most =
+        capabilities.device_memory_bytes ? capabilities.device_memory_bytes : largest_resource_bytes;
     if (bytes > most / (std::uint64_t{desc.layers} * desc.samples))
-        return problem(Rule::texture_bytes, ErrorCode::out_of_memory,
-                       fmt::format("expected at most {} bytes (the largest heap), found {} bytes in each of {} layers with "
-                                   "{} samples",
-                                   most, bytes, desc.layers, desc.samples),
-                       "Use a smaller texture.");
+        return problem(
+            Rule::texture_bytes, ErrorCode::out_of_memory,
+            fmt::format("expected at most {} bytes (the largest heap), found {} bytes in each of {} layers with "
+                        "{} samples",
+                        most, bytes, desc.layers, desc.samples),
+            "Use a smaller texture.");
     return {};
 }
 
@@ -225,12 +231,13 @@ Check check_sampler(const SamplerDesc& desc, const Capabilities& capabilities) {
     };
     if (!(desc.max_anisotropy >= 1.0f) || desc.max_anisotropy > std::max(1.0f, capabilities.max_anisotropy) ||
         (desc.max_anisotropy > 1.0f && !capabilities.anisotropic_filtering))
-        return problem(Rule::sampler_anisotropy, ErrorCode::invalid_argument,
-                       fmt::format("expected an anisotropy of 1 to {} (max_anisotropy), found {}",
-                                   capabilities.anisotropic_filtering ? capabilities.max_anisotropy : 1.0f,
-                                   desc.max_anisotropy),
-                       "Clamp it to Capabilities::max_anisotropy.");
-    const bool border = desc.address_u == AddressMode::clamp_to_border || desc.address_v == AddressMode::clamp_to_border ||
+        return problem(
+            Rule::sampler_anisotropy, ErrorCode::invalid_argument,
+            fmt::format("expected an anisotropy of 1 to {} (max_anisotropy), found {}",
+                        capabilities.anisotropic_filtering ? capabilities.max_anisotropy : 1.0f, desc.max_anisotropy),
+            "Clamp it to Capabilities::max_anisotropy.");
+    const bool border = desc.address_u == AddressMode::clamp_to_border ||
+                        desc.address_v == AddressMode::clamp_to_border ||
                         desc.address_w == AddressMode::clamp_to_border;
     if (border && !capabilities.border_color)
         return problem(Rule::sampler_border, ErrorCode::unsupported,
@@ -243,9 +250,10 @@ Check check_sampler(const SamplerDesc& desc, const Capabilities& capabilities) {
                                    desc.min_lod, desc.max_lod, desc.mip_bias),
                        "Correct the values.");
     if (desc.mip_bias != 0.0f && !capabilities.sampler_mip_bias)
-        return problem(Rule::sampler_lod, ErrorCode::unsupported,
-                       fmt::format("expected a mip_bias of 0 on a device without sampler_mip_bias, found {}", desc.mip_bias),
-                       "Pass the bias to texture() in the shader.");
+        return problem(
+            Rule::sampler_lod, ErrorCode::unsupported,
+            fmt::format("expected a mip_bias of 0 on a device without sampler_mip_bias, found {}", desc.mip_bias),
+            "Pass the bias to texture() in the shader.");
     return {};
 }
 
@@ -266,17 +274,22 @@ Check check_query_pool(const QueryPoolDesc& desc, const Capabilities& capabiliti
 Check check_view(const ViewReference& view, const TextureDesc& desc, const Capabilities& capabilities,
                  const char* attempted, const std::string& subject) {
     const auto problem = [&](Rule rule, std::string reason, std::string remedy) {
-        return Problem{rule, ErrorCode::invalid_argument, attempted, subject + ", " + quoted("texture", desc.name),
-                       std::move(reason), std::move(remedy)};
+        return Problem{rule,
+                       ErrorCode::invalid_argument,
+                       attempted,
+                       subject + ", " + quoted("texture", desc.name),
+                       std::move(reason),
+                       std::move(remedy)};
     };
     const std::uint32_t layers = layers_of(desc);
     if (view.mip_count == 0 || view.layer_count == 0 || view.base_mip >= desc.mips ||
         view.mip_count > desc.mips - view.base_mip || view.base_layer >= layers ||
         view.layer_count > layers - view.base_layer)
-        return problem(Rule::view_range,
-                       fmt::format("expected mips below {} and layers below {}, found {} mips from {} and {} layers from {}",
-                                   desc.mips, layers, view.mip_count, view.base_mip, view.layer_count, view.base_layer),
-                       "View mips and layers that the texture has.");
+        return problem(
+            Rule::view_range,
+            fmt::format("expected mips below {} and layers below {}, found {} mips from {} and {} layers from {}",
+                        desc.mips, layers, view.mip_count, view.base_mip, view.layer_count, view.base_layer),
+            "View mips and layers that the texture has.");
     bool fits = false;
     switch (view.dimension) {
         case ViewDimension::automatic: break;
@@ -306,8 +319,9 @@ Check check_view(const ViewReference& view, const TextureDesc& desc, const Capab
     if (view.format != desc.format) {
         const FormatInfo& own = info(desc.format);
         const FormatInfo& seen = info(view.format);
-        const bool possible = capabilities.texture_view_formats && !own.is_depth_stencil() && !seen.is_depth_stencil() &&
-                              own.block_bytes == seen.block_bytes && own.block_width == seen.block_width;
+        const bool possible = capabilities.texture_view_formats && !own.is_depth_stencil() &&
+                              !seen.is_depth_stencil() && own.block_bytes == seen.block_bytes &&
+                              own.block_width == seen.block_width;
         if (!possible)
             return problem(Rule::view_format,
                            fmt::format("expected format {}{}, found {}", own.name,
@@ -323,8 +337,12 @@ Check check_view(const ViewReference& view, const TextureDesc& desc, const Capab
 Check check_layout(const BindGroupLayoutDesc& desc, const Capabilities& capabilities) {
     const auto problem = [&](Rule rule, ErrorCode code, const BindingLayout& binding, std::string reason,
                              std::string remedy) {
-        return Problem{rule, code, "create bind group layout", fmt::format("'{}', binding {}", desc.name, binding.binding),
-                       std::move(reason), std::move(remedy)};
+        return Problem{rule,
+                       code,
+                       "create bind group layout",
+                       fmt::format("'{}', binding {}", desc.name, binding.binding),
+                       std::move(reason),
+                       std::move(remedy)};
     };
     for (std::size_t i = 0; i < desc.bindings.size(); ++i) {
         const BindingLayout& binding = desc.bindings[i];
@@ -333,20 +351,21 @@ Check check_layout(const BindGroupLayoutDesc& desc, const Capabilities& capabili
                            "expected each binding once, found it twice", "Give each binding its own number.");
         if (binding.binding > 4095)
             return problem(Rule::layout_binding_limit, ErrorCode::invalid_argument, binding,
-                           fmt::format("expected a number of at most 4095, found {}", binding.binding), "Number bindings from 0.");
+                           fmt::format("expected a number of at most 4095, found {}", binding.binding),
+                           "Number bindings from 0.");
         if (binding.stages == ShaderStage::none)
             return problem(Rule::layout_stages, ErrorCode::invalid_argument, binding,
                            "expected at least one shader stage, found none", "Set BindingLayout::stages.");
         if (binding.count == 0) {
-            const bool texture = binding.type == BindingType::sampled_texture ||
-                                 binding.type == BindingType::combined_texture_sampler;
+            const bool texture =
+                binding.type == BindingType::sampled_texture || binding.type == BindingType::combined_texture_sampler;
             if (!texture || !capabilities.descriptor_indexing)
-                return problem(Rule::layout_unbounded, texture ? ErrorCode::unsupported : ErrorCode::invalid_argument,
-                               binding,
-                               texture ? "expected a fixed count on a device without descriptor_indexing, found 0 (unbounded)"
-                                       : fmt::format("expected a fixed count for a {}, found 0 (unbounded)",
-                                                     name_of(binding.type)),
-                               "Use TextureTable, which works on every device, or give a count.");
+                return problem(
+                    Rule::layout_unbounded, texture ? ErrorCode::unsupported : ErrorCode::invalid_argument, binding,
+                    texture
+                        ? "expected a fixed count on a device without descriptor_indexing, found 0 (unbounded)"
+                        : fmt::format("expected a fixed count for a {}, found 0 (unbounded)", name_of(binding.type)),
+                    "Use TextureTable, which works on every device, or give a count.");
         }
     }
     const BindGroupLayoutDesc* one = &desc;
@@ -385,7 +404,10 @@ Check check_stage_limits(std::span<const BindGroupLayoutDesc* const> layouts, co
         }};
         for (std::size_t kind = 0; kind < limits.size(); ++kind)
             if (counts[kind] > limits[kind].second)
-                return Problem{Rule::layout_limit, ErrorCode::unsupported, attempted, subject,
+                return Problem{Rule::layout_limit,
+                               ErrorCode::unsupported,
+                               attempted,
+                               subject,
                                fmt::format("expected at most {} in the {} stage ({}), found {}", limits[kind].second,
                                            stage_names[stage], limits[kind].first, counts[kind]),
                                "Use fewer resources of this kind, or narrow BindingLayout::stages."};
@@ -395,13 +417,14 @@ Check check_stage_limits(std::span<const BindGroupLayoutDesc* const> layouts, co
 
 Check check_shader(const ShaderReflection& reflection, const std::string& name, const Capabilities& capabilities) {
     const auto problem = [&](Rule rule, std::string reason, std::string remedy) {
-        return Problem{rule, ErrorCode::unsupported, "create shader", "'" + name + "'", std::move(reason),
-                       std::move(remedy)};
+        return Problem{
+            rule, ErrorCode::unsupported, "create shader", "'" + name + "'", std::move(reason), std::move(remedy)};
     };
     const auto lacks = [&](std::string_view what, std::string_view capability) {
-        return problem(Rule::shader_capability,
-                       fmt::format("expected a shader without {} on a device without {}, found it used", what, capability),
-                       "Ask Capabilities first, and compile a variant of the shader without it.");
+        return problem(
+            Rule::shader_capability,
+            fmt::format("expected a shader without {} on a device without {}, found it used", what, capability),
+            "Ask Capabilities first, and compile a variant of the shader without it.");
     };
     if (reflection.uses_ray_query && !capabilities.ray_query) return lacks("ray queries", "ray_query");
     if (reflection.uses_subgroups && !capabilities.subgroup_operations)
@@ -423,20 +446,20 @@ Check check_shader(const ShaderReflection& reflection, const std::string& name, 
     const bool vertex = reflection.stage == ShaderStage::vertex;
     if ((vertex && !capabilities.storage_in_vertex) ||
         (reflection.stage == ShaderStage::fragment && !capabilities.storage_in_fragment))
-        for (const ReflectedBinding& binding : reflection.bindings)
-            switch (binding.type) {
+        for (const ReflectedBinding& binding : reflection.bindings) switch (binding.type) {
                 case BindingType::storage_buffer:
                 case BindingType::readonly_storage_buffer:
                 case BindingType::storage_image:
                 case BindingType::readonly_storage_image:
                 case BindingType::writeonly_storage_image:
-                    return problem(Rule::shader_storage_stage,
-                                   fmt::format("expected no storage buffers or images in the {} stage on a device without "
-                                               "{}, found {} '{}' at set {}, binding {}",
-                                               vertex ? "vertex" : "fragment",
-                                               vertex ? "storage_in_vertex" : "storage_in_fragment", name_of(binding.type),
-                                               binding.name, binding.set, binding.binding),
-                                   "Read through textures or uniform buffers, and write in a compute pass.");
+                    return problem(
+                        Rule::shader_storage_stage,
+                        fmt::format("expected no storage buffers or images in the {} stage on a device without "
+                                    "{}, found {} '{}' at set {}, binding {}",
+                                    vertex ? "vertex" : "fragment",
+                                    vertex ? "storage_in_vertex" : "storage_in_fragment", name_of(binding.type),
+                                    binding.name, binding.set, binding.binding),
+                        "Read through textures or uniform buffers, and write in a compute pass.");
                 default: break;
             }
     if (reflection.push_constant_bytes > capabilities.max_push_constant_bytes)
@@ -456,18 +479,20 @@ Check check_shader(const ShaderReflection& reflection, const std::string& name, 
             if (reflection.workgroup_size_ids[axis] != ~0u) continue;  // Checked with the pipeline's value.
             invocations *= std::max(1u, reflection.workgroup_size[axis]);
             if (reflection.workgroup_size[axis] > capabilities.max_workgroup_size[axis])
-                return problem(Rule::workgroup_limit,
-                               fmt::format("expected a workgroup of at most {}x{}x{} (max_workgroup_size), found {}x{}x{}",
-                                           capabilities.max_workgroup_size[0], capabilities.max_workgroup_size[1],
-                                           capabilities.max_workgroup_size[2], reflection.workgroup_size[0],
-                                           reflection.workgroup_size[1], reflection.workgroup_size[2]),
-                               "Use a smaller local_size.");
+                return problem(
+                    Rule::workgroup_limit,
+                    fmt::format("expected a workgroup of at most {}x{}x{} (max_workgroup_size), found {}x{}x{}",
+                                capabilities.max_workgroup_size[0], capabilities.max_workgroup_size[1],
+                                capabilities.max_workgroup_size[2], reflection.workgroup_size[0],
+                                reflection.workgroup_size[1], reflection.workgroup_size[2]),
+                    "Use a smaller local_size.");
         }
         if (invocations > capabilities.max_workgroup_invocations)
-            return problem(Rule::workgroup_limit,
-                           fmt::format("expected at most {} invocations in a workgroup (max_workgroup_invocations), found {}",
-                                       capabilities.max_workgroup_invocations, invocations),
-                           "Use a smaller local_size.");
+            return problem(
+                Rule::workgroup_limit,
+                fmt::format("expected at most {} invocations in a workgroup (max_workgroup_invocations), found {}",
+                            capabilities.max_workgroup_invocations, invocations),
+                "Use a smaller local_size.");
     }
     return {};
 }

@@ -107,17 +107,17 @@ struct BindGroupObject {
     std::vector<BufferUse> buffers;
     std::vector<TextureUse> textures;
     std::vector<SamplerUse> samplers;
-    std::uint64_t merged_epoch = 0;    ///< Scope into which its uses were merged last.
-    std::uint64_t checked_epoch = 0;   ///< Count of destructions at which its resources were known to live.
+    std::uint64_t merged_epoch = 0;   ///< Scope into which its uses were merged last.
+    std::uint64_t checked_epoch = 0;  ///< Count of destructions at which its resources were known to live.
 };
 
 /// What graphics and compute pipelines have in common.
 struct PipelineCommon {
     std::string name;
-    std::vector<BindGroupLayout> layouts;   ///< One for each index up to the highest used.
-    std::uint32_t group_mask = 0;           ///< Indices whose layout has bindings.
+    std::vector<BindGroupLayout> layouts;  ///< One for each index up to the highest used.
+    std::uint32_t group_mask = 0;          ///< Indices whose layout has bindings.
     std::uint32_t push_constant_bytes = 0;
-    std::vector<ReflectedBinding> bindings; ///< What the shaders declare, merged over the stages.
+    std::vector<ReflectedBinding> bindings;  ///< What the shaders declare, merged over the stages.
     /// Kept alive for backends that look at them when the pipeline is first used.
     std::vector<std::shared_ptr<BackendShader>> shaders;
 };
@@ -126,8 +126,8 @@ struct GraphicsPipelineObject {
     std::unique_ptr<BackendGraphicsPipeline> backend;
     PipelineCommon common;
     GraphicsPipelineDesc desc;
-    std::uint32_t vertex_buffer_mask = 0;   ///< Slots that attributes read.
-    bool writes_depth = false;              ///< Depth or stencil.
+    std::uint32_t vertex_buffer_mask = 0;  ///< Slots that attributes read.
+    bool writes_depth = false;             ///< Depth or stencil.
 };
 
 struct ComputePipelineObject {

@@ -22,7 +22,7 @@ class SlotTable {
         std::uint32_t generation = 1;  ///< Of the object in the slot, or of the next one where it is empty.
         bool occupied = false;
         Object object{};
-        std::string last_name{};       ///< Of the object that was here before, for messages about stale handles.
+        std::string last_name{};  ///< Of the object that was here before, for messages about stale handles.
     };
 
     explicit SlotTable(std::uint16_t device) : device_(device) {}

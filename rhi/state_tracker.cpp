@@ -202,8 +202,7 @@ void StateTracker::transition(TextureObject& texture) {
         const ResourceState before = texture.states[i];
         const Step next = step(before, needed, true);
         texture.states[i] = next.after;
-        if (next.barrier)
-            wanted[i] = {true, discard_at(i) || before.use == ResourceUse::none, before, next.after};
+        if (next.barrier) wanted[i] = {true, discard_at(i) || before.use == ResourceUse::none, before, next.after};
     }
     const auto index = [&](std::uint32_t layer, std::uint32_t mip) { return std::size_t{layer} * desc.mips + mip; };
     for (std::uint32_t layer = 0; layer < layers; ++layer)
@@ -249,7 +248,8 @@ void StateTracker::end_scope(const CommandHeader* before) {
         {before, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(barriers_.size() - first)});
 }
 
-void StateTracker::add_barrier(const CommandHeader* before, BackendBuffer& buffer, ResourceState from, ResourceState to) {
+void StateTracker::add_barrier(const CommandHeader* before, BackendBuffer& buffer, ResourceState from,
+                               ResourceState to) {
     Barrier barrier;
     barrier.buffer = &buffer;
     barrier.before = from;
@@ -260,9 +260,9 @@ void StateTracker::add_barrier(const CommandHeader* before, BackendBuffer& buffe
 
 std::string text_of(ResourceUse use) {
     static constexpr std::array<std::string_view, 15> names{
-        "vertex_buffer", "index_buffer", "indirect_argument", "uniform_buffer", "sampled", "storage_read",
-        "storage_write", "color_target", "depth_stencil_write", "depth_stencil_read", "copy_source",
-        "copy_destination", "resolve_source", "resolve_destination", "host_read"};
+        "vertex_buffer", "index_buffer",     "indirect_argument", "uniform_buffer",      "sampled",
+        "storage_read",  "storage_write",    "color_target",      "depth_stencil_write", "depth_stencil_read",
+        "copy_source",   "copy_destination", "resolve_source",    "resolve_destination", "host_read"};
     std::string text;
     for (std::size_t i = 0; i < names.size(); ++i)
         if (static_cast<std::uint32_t>(use) >> i & 1) text += (text.empty() ? "" : " | ") + std::string(names[i]);

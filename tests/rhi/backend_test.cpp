@@ -19,8 +19,7 @@ using namespace rhi;
 /// Keeps failures of a test that is expected to fail away from the run.
 class FailureCatcher {
   public:
-    FailureCatcher()
-        : reporter_(::testing::ScopedFakeTestPartResultReporter::INTERCEPT_ALL_THREADS, &results_) {}
+    FailureCatcher() : reporter_(::testing::ScopedFakeTestPartResultReporter::INTERCEPT_ALL_THREADS, &results_) {}
     [[nodiscard]] bool has_failed() const {
         for (int i = 0; i < results_.size(); ++i)
             if (results_.GetTestPartResult(i).failed()) return true;
@@ -148,7 +147,8 @@ void BackendTest::TearDown() {
         dirty = device_->is_lost();
         for (const std::string& code : expected_) {
             const auto all = messages();
-            const bool came = std::any_of(all.begin(), all.end(), [&](const Message& message) { return message.code.starts_with(code); });
+            const bool came = std::any_of(all.begin(), all.end(),
+                                          [&](const Message& message) { return message.code.starts_with(code); });
             EXPECT_TRUE(came) << "no message " << code;
         }
         for (const Message& message : messages()) {
@@ -164,7 +164,8 @@ void BackendTest::TearDown() {
         const bool failed = catcher_->has_failed();
         catcher_.reset();
         RecordProperty("expected_failure", "yes");
-        if (!failed && !IsSkipped()) ADD_FAILURE() << "passed, though tests/rhi/expected_failures.cpp expects a failure; remove the entry";
+        if (!failed && !IsSkipped())
+            ADD_FAILURE() << "passed, though tests/rhi/expected_failures.cpp expects a failure; remove the entry";
         dirty = true;
     }
     if (dirty || HasFailure()) shared_devices()[GetParam().name].device.reset();
@@ -269,9 +270,13 @@ void BackendTest::cover(Texture target, const std::string& fragment, const std::
 }
 
 Sampler BackendTest::nearest() {
-    return sampler({.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest,
-                    .address_u = AddressMode::clamp_to_edge, .address_v = AddressMode::clamp_to_edge,
-                    .address_w = AddressMode::clamp_to_edge, .name = "nearest"});
+    return sampler({.magnify = Filter::nearest,
+                    .minify = Filter::nearest,
+                    .mip = Filter::nearest,
+                    .address_u = AddressMode::clamp_to_edge,
+                    .address_v = AddressMode::clamp_to_edge,
+                    .address_w = AddressMode::clamp_to_edge,
+                    .name = "nearest"});
 }
 
 }  // namespace nacre::test

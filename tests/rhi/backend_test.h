@@ -31,10 +31,10 @@ namespace nacre::test {
 
 /// A device that the suite runs on.
 struct Variant {
-    std::string name;         ///< "vulkan_renderpass"; part of the test's name and a column of docs/support.md.
-    std::string backend;      ///< Backend spec.
+    std::string name;     ///< "vulkan_renderpass"; part of the test's name and a column of docs/support.md.
+    std::string backend;  ///< Backend spec.
     std::string restriction;
-    std::string title;        ///< Heading in docs/support.md.
+    std::string title;  ///< Heading in docs/support.md.
 };
 
 /// How GoogleTest shows a variant.
@@ -42,7 +42,8 @@ inline void PrintTo(const Variant& variant, std::ostream* out) { *out << variant
 
 /// All variants that the suite knows.
 std::span<const Variant> all_variants();
-/// Those that a device can be made of here. Restricted to NACRE_TEST_BACKENDS (names with commas between) where it is set.
+/// Those that a device can be made of here. Restricted to NACRE_TEST_BACKENDS (names with commas between) where it is
+/// set.
 const std::vector<Variant>& available_variants();
 /// Over all backends of the program.
 const rhi::Instance& instance();
@@ -143,7 +144,9 @@ class BackendTest : public ::testing::TestWithParam<Variant> {
     rhi::Texture texture_of(rhi::Format format, std::uint32_t width, std::uint32_t height, std::span<const T> texels,
                             std::string name = "texture") {
         const rhi::Texture made = ok(device().create_texture(
-            {.format = format, .width = width, .height = height,
+            {.format = format,
+             .width = width,
+             .height = height,
              .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::copy_destination | rhi::TextureUsage::copy_source,
              .name = std::move(name)}));
         ok(device().write_texture(made, std::as_bytes(texels)));
@@ -167,10 +170,10 @@ class BackendTest : public ::testing::TestWithParam<Variant> {
 extern const char* const fullscreen_vertex;
 
 /// Declares a suite that runs on every available variant.
-#define BACKEND_SUITE(Suite)                                                                               \
-    class Suite : public ::nacre::test::BackendTest {};                                                    \
-    GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Suite);                                                  \
-    INSTANTIATE_TEST_SUITE_P(Rhi, Suite, ::testing::ValuesIn(::nacre::test::available_variants()),          \
+#define BACKEND_SUITE(Suite)                                                                       \
+    class Suite : public ::nacre::test::BackendTest {};                                            \
+    GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Suite);                                          \
+    INSTANTIATE_TEST_SUITE_P(Rhi, Suite, ::testing::ValuesIn(::nacre::test::available_variants()), \
                              [](const auto& parameter) { return parameter.param.name; })
 
 /// Skips the test where the condition, a question to the capabilities, does not hold.

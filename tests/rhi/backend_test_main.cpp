@@ -30,11 +30,14 @@ class Results : public ::testing::EmptyTestEventListener {
         const std::string test = full.substr(0, slash);
         const std::string variant = full.substr(slash + 1);
         Outcome outcome = Outcome::passed;
-        if (info.result()->Failed()) outcome = Outcome::failed;
-        else if (info.result()->Skipped()) outcome = Outcome::skipped;
+        if (info.result()->Failed())
+            outcome = Outcome::failed;
+        else if (info.result()->Skipped())
+            outcome = Outcome::skipped;
         else
             for (const ExpectedFailure& failure : expected_failures())
-                if (failure.test == suite + "." + test && failure.variant == variant) outcome = Outcome::expected_failure;
+                if (failure.test == suite + "." + test && failure.variant == variant)
+                    outcome = Outcome::expected_failure;
         if (outcomes_.find({suite, test}) == outcomes_.end()) order_.push_back({suite, test});
         outcomes_[{suite, test}][variant] = outcome;
         if (outcome != Outcome::skipped) ++executed_[variant];
@@ -61,15 +64,20 @@ class Results : public ::testing::EmptyTestEventListener {
             }
             if (cells.empty()) continue;
             if (cells[0].starts_with("---")) continue;
-            if (columns.empty()) columns.assign(cells.begin() + 1, cells.end());
+            if (columns.empty())
+                columns.assign(cells.begin() + 1, cells.end());
             else
-                for (std::size_t i = 1; i < cells.size() && i <= columns.size(); ++i) before[cells[0]][columns[i - 1]] = cells[i];
+                for (std::size_t i = 1; i < cells.size() && i <= columns.size(); ++i)
+                    before[cells[0]][columns[i - 1]] = cells[i];
         }
         std::ostringstream text;
         text << "# What works where\n\n"
-                "Generated from the tests of the render-hardware interface (`rhi_backend_test --update-support`): a row is a\n"
-                "test, a column a device that it ran on. \"yes\": the test passed. \"-\": the device lacks the feature, and says\n"
-                "so in its capabilities. \"no\": a known failure, with its reason in `tests/rhi/expected_failures.cpp`.\n\n";
+                "Generated from the tests of the render-hardware interface (`rhi_backend_test --update-support`): a "
+                "row is a\n"
+                "test, a column a device that it ran on. \"yes\": the test passed. \"-\": the device lacks the "
+                "feature, and says\n"
+                "so in its capabilities. \"no\": a known failure, with its reason in "
+                "`tests/rhi/expected_failures.cpp`.\n\n";
         text << "| method or feature |";
         for (const Variant& variant : all_variants()) text << " " << variant.title << " |";
         text << "\n|---|";
@@ -83,7 +91,8 @@ class Results : public ::testing::EmptyTestEventListener {
                 const auto at = found.find(variant.name);
                 std::string cell = "?";
                 if (at == found.end()) {
-                    if (const auto kept = before.find(row); kept != before.end() && kept->second.contains(variant.title))
+                    if (const auto kept = before.find(row);
+                        kept != before.end() && kept->second.contains(variant.title))
                         cell = kept->second.at(variant.title);
                 } else {
                     cell = at->second == Outcome::passed    ? "yes"

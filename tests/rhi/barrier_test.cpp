@@ -11,7 +11,8 @@ using namespace rhi;
 using enum ResourceUse;
 
 constexpr auto all_buffer_uses = BufferUsage::storage | BufferUsage::copy_source | BufferUsage::copy_destination |
-                                 BufferUsage::vertex | BufferUsage::index | BufferUsage::uniform | BufferUsage::indirect;
+                                 BufferUsage::vertex | BufferUsage::index | BufferUsage::uniform |
+                                 BufferUsage::indirect;
 constexpr auto all_texture_uses = TextureUsage::sampled | TextureUsage::storage | TextureUsage::color_target |
                                   TextureUsage::copy_source | TextureUsage::copy_destination;
 
@@ -26,8 +27,11 @@ const NullCommand& command(Bench& bench, CommandType type, int index = 0) {
     return none;
 }
 
-const char* const write_shader = "layout(local_size_x = 1) in; layout(set = 0, binding = 0) buffer R { uint r[]; }; void main() { r[0] += 1u; }";
-const char* const read_shader = "layout(local_size_x = 1) in; layout(set = 0, binding = 0) readonly buffer S { uint s[]; }; layout(set = 0, binding = 1) buffer R { uint r[]; }; void main() { r[0] = s[0]; }";
+const char* const write_shader =
+    "layout(local_size_x = 1) in; layout(set = 0, binding = 0) buffer R { uint r[]; }; void main() { r[0] += 1u; }";
+const char* const read_shader =
+    "layout(local_size_x = 1) in; layout(set = 0, binding = 0) readonly buffer S { uint s[]; }; layout(set = 0, "
+    "binding = 1) buffer R { uint r[]; }; void main() { r[0] = s[0]; }";
 
 TEST(Barriers, FirstUseOfABufferNeedsNoneAndWritesDo) {
     Bench bench;
@@ -100,14 +104,16 @@ TEST(Barriers, IndirectArgumentsVerticesAndIndices) {
     std::map<std::string, ResourceUse> found;
     for (const Barrier& barrier : command(bench, CommandType::begin_render_pass).barriers)
         if (barrier.buffer) found[barrier.buffer->desc.name] = barrier.after.use;
-    EXPECT_EQ(found, (std::map<std::string, ResourceUse>{{"arguments", indirect_argument}, {"vertices", vertex_buffer}, {"indices", index_buffer}}));
+    EXPECT_EQ(found, (std::map<std::string, ResourceUse>{
+                         {"arguments", indirect_argument}, {"vertices", vertex_buffer}, {"indices", index_buffer}}));
     EXPECT_TRUE(command(bench, CommandType::draw_indexed_indirect).barriers.empty());
 }
 
 TEST(Barriers, TargetsAreDiscardedWhereTheyAreCleared) {
     Bench bench;
     const Texture target = bench.target();
-    for (const LoadOperation load : {LoadOperation::load, LoadOperation::clear, LoadOperation::discard, LoadOperation::load}) {
+    for (const LoadOperation load :
+         {LoadOperation::load, LoadOperation::clear, LoadOperation::discard, LoadOperation::load}) {
         CommandList list = bench.list();
         list.begin_render_pass({.color = {{.view = target, .load = load}}});
         list.end_render_pass();
@@ -162,9 +168,12 @@ TEST(Barriers, MipsAndLayersAreTrackedApart) {
 TEST(Barriers, ReadsWidenTheirStagesOnce) {
     Bench bench;
     const ComputePipeline sample = bench.compute(
-        "layout(local_size_x = 1) in; layout(set = 0, binding = 0) buffer R { vec4 r[1]; }; layout(set = 0, binding = 1) uniform sampler2D image; void main() { r[0] = texelFetch(image, ivec2(0), 0); }");
+        "layout(local_size_x = 1) in; layout(set = 0, binding = 0) buffer R { vec4 r[1]; }; layout(set = 0, binding = "
+        "1) uniform sampler2D image; void main() { r[0] = texelFetch(image, ivec2(0), 0); }");
     GraphicsPipelineDesc desc = bench.graphics_desc();
-    desc.fragment = bench.shader("frag", "layout(set = 0, binding = 0) uniform sampler2D image; layout(location = 0) out vec4 color; void main() { color = texelFetch(image, ivec2(0), 0); }");
+    desc.fragment = bench.shader("frag",
+                                 "layout(set = 0, binding = 0) uniform sampler2D image; layout(location = 0) out vec4 "
+                                 "color; void main() { color = texelFetch(image, ivec2(0), 0); }");
     const GraphicsPipeline draw = *bench.device().create_graphics_pipeline(desc);
     const Texture texture = bench.texture(all_texture_uses);
     const Sampler sampler = *bench.device().create_sampler({});
@@ -179,7 +188,8 @@ TEST(Barriers, ReadsWidenTheirStagesOnce) {
         list.draw({.vertex_count = 3});
         list.end_render_pass();
         list.set_pipeline(sample);
-        list.set_bind_group(0, bench.group(sample, {{.binding = 0, .buffer = bench.buffer(all_buffer_uses)}, {.binding = 1, .texture = texture, .sampler = sampler}}));
+        list.set_bind_group(0, bench.group(sample, {{.binding = 0, .buffer = bench.buffer(all_buffer_uses)},
+                                                    {.binding = 1, .texture = texture, .sampler = sampler}}));
         list.dispatch({});
     }
     list.clear_texture(texture, {});
@@ -207,7 +217,9 @@ TEST(Barriers, ReadOnlyDepthMayBeSampledInItsPass) {
     Bench bench;
     GraphicsPipelineDesc desc = bench.graphics_desc();
     desc.depth_stencil = {.format = Format::d32_float, .depth_test = true};
-    desc.fragment = bench.shader("frag", "layout(set = 0, binding = 0) uniform sampler2D image; layout(location = 0) out vec4 color; void main() { color = texelFetch(image, ivec2(0), 0); }");
+    desc.fragment = bench.shader("frag",
+                                 "layout(set = 0, binding = 0) uniform sampler2D image; layout(location = 0) out vec4 "
+                                 "color; void main() { color = texelFetch(image, ivec2(0), 0); }");
     const GraphicsPipeline draw = *bench.device().create_graphics_pipeline(desc);
     const Texture depth = bench.depth();
     CommandList list = bench.list();
@@ -215,7 +227,8 @@ TEST(Barriers, ReadOnlyDepthMayBeSampledInItsPass) {
     list.end_render_pass();
     list.begin_render_pass({.color = {{.view = bench.target()}}, .depth_stencil = {.view = depth, .read_only = true}});
     list.set_pipeline(draw);
-    list.set_bind_group(0, bench.group(draw, {{.binding = 0, .texture = depth, .sampler = *bench.device().create_sampler({})}}));
+    list.set_bind_group(
+        0, bench.group(draw, {{.binding = 0, .texture = depth, .sampler = *bench.device().create_sampler({})}}));
     list.draw({.vertex_count = 3});
     list.end_render_pass();
     ASSERT_TRUE(bench.device().submit(std::move(list)));
@@ -234,7 +247,10 @@ TEST(Barriers, EveryTextureOfAnUnboundedArrayIsCovered) {
     const BindGroupLayout layout = *bench.device().create_bind_group_layout(
         {.bindings = {{0, BindingType::combined_texture_sampler, 0, ShaderStage::fragment}}, .name = "bindless"});
     GraphicsPipelineDesc desc = bench.graphics_desc();
-    desc.fragment = bench.shader("frag", "#extension GL_EXT_nonuniform_qualifier : require\nlayout(set = 0, binding = 0) uniform sampler2D images[]; layout(location = 0) out vec4 color; void main() { color = texelFetch(images[nonuniformEXT(int(gl_FragCoord.x))], ivec2(0), 0); }");
+    desc.fragment = bench.shader("frag",
+                                 "#extension GL_EXT_nonuniform_qualifier : require\nlayout(set = 0, binding = 0) "
+                                 "uniform sampler2D images[]; layout(location = 0) out vec4 color; void main() { color "
+                                 "= texelFetch(images[nonuniformEXT(int(gl_FragCoord.x))], ivec2(0), 0); }");
     desc.bind_group_layouts = {layout};
     const auto pipeline = bench.device().create_graphics_pipeline(desc);
     ASSERT_TRUE(pipeline) << pipeline.error().message();
@@ -243,11 +259,13 @@ TEST(Barriers, EveryTextureOfAnUnboundedArrayIsCovered) {
     for (std::uint32_t i = 0; i < 20; ++i) {
         const Texture texture = bench.texture(all_texture_uses);
         list.clear_texture(texture, {});
-        entries.push_back({.binding = 0, .texture = texture, .sampler = *bench.device().create_sampler({}), .element = i * 3});
+        entries.push_back(
+            {.binding = 0, .texture = texture, .sampler = *bench.device().create_sampler({}), .element = i * 3});
     }
     list.begin_render_pass({.color = {{.view = bench.target()}}});
     list.set_pipeline(*pipeline);
-    list.set_bind_group(0, *bench.device().create_bind_group({.layout = layout, .entries = entries, .name = "bindless"}));
+    list.set_bind_group(0,
+                        *bench.device().create_bind_group({.layout = layout, .entries = entries, .name = "bindless"}));
     list.draw({.vertex_count = 3});
     list.end_render_pass();
     ASSERT_TRUE(bench.device().submit(std::move(list)));

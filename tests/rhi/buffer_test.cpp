@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/rhi/backend_test.h"
-
 #include <numeric>
+
+#include "tests/rhi/backend_test.h"
 
 namespace nacre::test {
 namespace {

@@ -23,8 +23,10 @@ TEST(Capabilities, ListHoldsEveryMemberOfTheStructure) {
     declarations = declarations.substr(declarations.find("struct Capabilities {"));
     declarations = declarations.substr(0, declarations.find("std::array<FormatSupport, format_count> formats"));
     std::set<std::string> members, listed;
-    const std::regex member(R"(^    (?:bool|float|double|std::uint\d+_t|std::array<std::uint32_t, 3>) (\w+)(?: =|\{))", std::regex::multiline);
-    for (std::sregex_iterator at(declarations.begin(), declarations.end(), member), end; at != end; ++at) members.insert((*at)[1]);
+    const std::regex member(R"(^    (?:bool|float|double|std::uint\d+_t|std::array<std::uint32_t, 3>) (\w+)(?: =|\{))",
+                            std::regex::multiline);
+    for (std::sregex_iterator at(declarations.begin(), declarations.end(), member), end; at != end; ++at)
+        members.insert((*at)[1]);
     for (const CapabilityEntry& entry : list_capabilities({}))
         if (!entry.name.starts_with("format ")) {
             EXPECT_TRUE(listed.insert(entry.name).second) << entry.name;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compute shaders: constants, indirect dispatches, and the barriers between dispatches that nobody writes.
-#include "tests/rhi/backend_test.h"
-
 #include <numeric>
+
+#include "tests/rhi/backend_test.h"
 
 namespace nacre::test {
 namespace {
@@ -19,7 +19,8 @@ TEST_P(Compute, WorkgroupsAndInvocations) {
             uint group = (gl_WorkGroupID.z * gl_NumWorkGroups.y + gl_WorkGroupID.y) * gl_NumWorkGroups.x + gl_WorkGroupID.x;
             result[group * 16u + gl_LocalInvocationIndex] = group * 1000u + gl_LocalInvocationID.x + 10u * gl_LocalInvocationID.y + 100u * gl_LocalInvocationID.z;
         }
-    )", 16 * 12, {}, {3, 2, 2});
+    )",
+                                                16 * 12, {}, {3, 2, 2});
     for (std::uint32_t group = 0; group < 12; ++group)
         for (std::uint32_t i = 0; i < 16; ++i)
             ASSERT_EQ(values[group * 16 + i], group * 1000 + i % 4 + i / 4 % 2 * 10 + i / 8 * 100);
@@ -42,7 +43,8 @@ TEST_P(Compute, SpecializationConstants) {
     dispatch(compute(body, {{4, 1u}}), {{.binding = 0, .buffer = result}});
     auto values = read<float>(result);
     EXPECT_EQ(std::vector<float>(values.begin(), values.begin() + 5), (std::vector<float>{0, -1, 3, 0.5f, 1}));
-    dispatch(compute(body, {{0, true}, {1, -77}, {2, 4000000u}, {3, 2.25f}, {4, 8u}}), {{.binding = 0, .buffer = result}});
+    dispatch(compute(body, {{0, true}, {1, -77}, {2, 4000000u}, {3, 2.25f}, {4, 8u}}),
+             {{.binding = 0, .buffer = result}});
     values = read<float>(result);
     EXPECT_EQ(std::vector<float>(values.begin(), values.begin() + 5), (std::vector<float>{1, -77, 4000000, 2.25f, 8}));
 }
@@ -151,7 +153,8 @@ TEST_P(Compute, SharedMemoryAndBarriers) {
             barrier();
             result[i] = values[63u - i];
         }
-    )", 64);
+    )",
+                                                64);
     for (std::uint32_t i = 0; i < 64; ++i) EXPECT_EQ(values[i], (63 - i) * (63 - i));
 }
 
@@ -185,7 +188,8 @@ TEST_P(Compute, ExplicitLayoutsAreSharedByPipelines) {
                       {2, BindingType::readonly_storage_buffer, 1, ShaderStage::compute}},
          .name = "shared"}));
     const auto make = [&](const std::string& body) {
-        return ok(device().create_compute_pipeline({.shader = shader(ShaderStage::compute, body), .bind_group_layouts = {layout}, .name = "one"}));
+        return ok(device().create_compute_pipeline(
+            {.shader = shader(ShaderStage::compute, body), .bind_group_layouts = {layout}, .name = "one"}));
     };
     const ComputePipeline first = make(R"(
         layout(local_size_x = 1) in;
@@ -201,12 +205,12 @@ TEST_P(Compute, ExplicitLayoutsAreSharedByPipelines) {
     )");
     const std::array<float, 4> a{1, 2, 3, 4}, b{10, 20, 30, 40};
     const Buffer result = buffer(16, BufferUsage::storage);
-    const BindGroup shared = ok(device().create_bind_group(
-        {.layout = layout,
-         .entries = {{.binding = 0, .buffer = result},
-                     {.binding = 1, .buffer = buffer_of<float>(a, BufferUsage::uniform)},
-                     {.binding = 2, .buffer = buffer_of<float>(b, BufferUsage::storage)}},
-         .name = "shared"}));
+    const BindGroup shared =
+        ok(device().create_bind_group({.layout = layout,
+                                       .entries = {{.binding = 0, .buffer = result},
+                                                   {.binding = 1, .buffer = buffer_of<float>(a, BufferUsage::uniform)},
+                                                   {.binding = 2, .buffer = buffer_of<float>(b, BufferUsage::storage)}},
+                                       .name = "shared"}));
     CommandList list = device().create_command_list("shared");
     list.set_pipeline(first);
     list.set_bind_group(0, shared);
@@ -221,7 +225,10 @@ TEST_P(Compute, ArraysOfTexturesWithConstantIndices) {
     std::vector<BindGroupEntry> entries;
     for (std::uint32_t i = 0; i < 3; ++i) {
         const std::uint32_t value = 100 + i;
-        entries.push_back({.binding = 1, .texture = texture_of<std::uint32_t>(Format::r32_uint, 1, 1, std::span(&value, 1)), .sampler = nearest(), .element = i});
+        entries.push_back({.binding = 1,
+                           .texture = texture_of<std::uint32_t>(Format::r32_uint, 1, 1, std::span(&value, 1)),
+                           .sampler = nearest(),
+                           .element = i});
     }
     const auto values = evaluate<std::uint32_t>(R"(
         layout(local_size_x = 1) in;
@@ -232,7 +239,8 @@ TEST_P(Compute, ArraysOfTexturesWithConstantIndices) {
             result[1] = texelFetch(images[1], ivec2(0), 0).r;
             result[2] = texelFetch(images[2], ivec2(0), 0).r;
         }
-    )", 3, entries);
+    )",
+                                                3, entries);
     EXPECT_EQ(values, (std::vector<std::uint32_t>{100, 101, 102}));
 }
 
@@ -248,7 +256,8 @@ TEST_P(Compute, SeparateTexturesAndSamplers) {
             result[0] = textureLod(sampler2D(image, point), vec2(0.25, 0.5), 0.0).r;
             result[1] = textureLod(sampler2D(image, point), vec2(0.75, 0.5), 0.0).r;
         }
-    )", 2, {{.binding = 1, .texture = texture}, {.binding = 2, .sampler = nearest()}});
+    )",
+                                        2, {{.binding = 1, .texture = texture}, {.binding = 2, .sampler = nearest()}});
     EXPECT_EQ(values, (std::vector<float>{1.0f, 3.0f}));
 }
 

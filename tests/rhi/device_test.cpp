@@ -12,7 +12,8 @@ namespace {
 
 using test::NullSetup;
 
-BufferDesc storage(std::uint64_t size, std::string name) { return {size, BufferUsage::storage | BufferUsage::copy_destination, MemoryKind::device, std::move(name)};
+BufferDesc storage(std::uint64_t size, std::string name) {
+    return {size, BufferUsage::storage | BufferUsage::copy_destination, MemoryKind::device, std::move(name)};
 }
 
 TEST(Device, WrittenContentIsReadBack) {

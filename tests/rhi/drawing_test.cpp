@@ -28,7 +28,8 @@ TEST_P(Drawing, TriangleCoversItsHalf) {
     CommandList list = device().create_command_list("triangle");
     ClearColor clear;
     clear.floating = {0.2f, 0.4f, 0.6f, 0.8f};
-    list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear, .clear = clear}}, .name = "pass"});
+    list.begin_render_pass(
+        {.color = {{.view = picture, .load = LoadOperation::clear, .clear = clear}}, .name = "pass"});
     list.set_pipeline(pipeline);
     list.draw({.vertex_count = 3});
     list.end_render_pass();
@@ -39,7 +40,8 @@ TEST_P(Drawing, TriangleCoversItsHalf) {
         for (std::uint32_t x = 0; x < 16; ++x) {
             if (x + y == 15) continue;  // The edge runs through these centers.
             const auto& texel = texels[y * 16 + x];
-            const std::array<std::uint8_t, 4> inside{static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), 255, 255};
+            const std::array<std::uint8_t, 4> inside{static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), 255,
+                                                     255};
             const std::array<std::uint8_t, 4> outside{51, 102, 153, 204};
             if (x + y < 15) {
                 // gl_FragCoord is x + 0.5; the half is rounded either way.

@@ -38,7 +38,8 @@ inline rhi::Capabilities full_capabilities() {
     c.storage_in_vertex = c.storage_in_fragment = c.dual_source_blending = c.independent_blend = true;
     c.descriptor_indexing = c.anisotropic_filtering = c.border_color = c.depth_clamp = c.depth_bias_clamp = true;
     c.wireframe = c.cube_arrays = c.multi_draw_indirect = c.indirect_first_instance = c.timestamps = true;
-    c.precise_occlusion = c.block_compression = c.float_color_targets = c.base_instance = c.texture_views = c.texture_view_formats = true;
+    c.precise_occlusion = c.block_compression = c.float_color_targets = c.base_instance = c.texture_views =
+        c.texture_view_formats = true;
     c.max_texture_1d = c.max_texture_2d = c.max_texture_cube = 16384;
     c.max_texture_3d = c.max_texture_layers = 2048;
     c.max_color_targets = 8;
@@ -101,8 +102,7 @@ class NullBuffer final : public Counted<rhi::BackendBuffer> {
 
 class NullDevice final : public rhi::BackendDevice {
   public:
-    NullDevice(std::shared_ptr<NullLog> log, const rhi::DeviceDesc& desc)
-        : log_(std::move(log)), faults_(desc.faults) {
+    NullDevice(std::shared_ptr<NullLog> log, const rhi::DeviceDesc& desc) : log_(std::move(log)), faults_(desc.faults) {
         adapter_ = {"null", 0, "null device", "null 1.0", "null", true};
     }
     const rhi::AdapterInfo& adapter() const override { return adapter_; }
@@ -208,11 +208,16 @@ class NullDevice final : public rhi::BackendDevice {
         if (!condition) std::abort();
     }
     static std::uint64_t size(rhi::BackendBuffer* buffer) { return static_cast<NullBuffer*>(buffer)->bytes.size(); }
-    static void require_region(const rhi::BufferTextureCopy& region, std::uint64_t bytes, const rhi::TextureDesc& desc) {
+    static void require_region(const rhi::BufferTextureCopy& region, std::uint64_t bytes,
+                               const rhi::TextureDesc& desc) {
         const rhi::Extent3D extent = rhi::mip_extent(desc, region.mip);
-        require(region.mip < desc.mips && region.layer < desc.layers && region.offset.x + region.extent.width <= extent.width &&
-                region.offset.y + region.extent.height <= extent.height && region.offset.z + region.extent.depth <= extent.depth);
-        require(region.buffer_offset + std::uint64_t{region.extent.depth - 1} * region.rows_per_slice * region.bytes_per_row <= bytes);
+        require(region.mip < desc.mips && region.layer < desc.layers &&
+                region.offset.x + region.extent.width <= extent.width &&
+                region.offset.y + region.extent.height <= extent.height &&
+                region.offset.z + region.extent.depth <= extent.depth);
+        require(region.buffer_offset +
+                    std::uint64_t{region.extent.depth - 1} * region.rows_per_slice * region.bytes_per_row <=
+                bytes);
     }
     static std::byte* bytes(rhi::BackendBuffer* buffer) { return static_cast<NullBuffer*>(buffer)->bytes.data(); }
     static void carry_out(const rhi::CommandHeader& header, std::byte* payload) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Thousands of calls with right, wrong, stale and foreign arguments in any order. Whatever happens is an error or works; under
-// the sanitizers nothing else may be seen. The backend checks that what reaches it is possible.
+// Thousands of calls with right, wrong, stale and foreign arguments in any order. Whatever happens is an error or
+// works; under the sanitizers nothing else may be seen. The backend checks that what reaches it is possible.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -14,37 +14,69 @@ using namespace rhi;
 
 class RandomCalls {
   public:
-    RandomCalls(std::uint32_t seed, bool validation) : random_(seed), bench_(desc(validation), small_capabilities()), list_(bench_.list()) {
+    RandomCalls(std::uint32_t seed, bool validation)
+        : random_(seed), bench_(desc(validation), small_capabilities()), list_(bench_.list()) {
         bench_.device().set_message_callback([this](const Message&) { ++messages_; });
-        compute_ = bench_.compute("layout(local_size_x = 1) in; layout(set = 0, binding = 0) buffer R { uint r[4]; }; layout(set = 0, binding = 1) uniform sampler2D image; layout(push_constant) uniform P { vec4 p; }; void main() { r[0] = uint(texelFetch(image, ivec2(0), 0).r + p.x); }");
+        compute_ = bench_.compute(
+            "layout(local_size_x = 1) in; layout(set = 0, binding = 0) buffer R { uint r[4]; }; layout(set = 0, "
+            "binding = 1) uniform sampler2D image; layout(push_constant) uniform P { vec4 p; }; void main() { r[0] = "
+            "uint(texelFetch(image, ivec2(0), 0).r + p.x); }");
         graphics_ = bench_.graphics();
         sampler_ = *bench_.device().create_sampler({});
         foreign_ = other_.buffer(BufferUsage::storage);
         buffers_ = {foreign_, Buffer{}};
         textures_ = {Texture{}};
         groups_ = {BindGroup{}};
-        pools_ = {QueryPool{}, *bench_.device().create_query_pool({QueryType::timestamp, 4, "times"}), *bench_.device().create_query_pool({QueryType::occlusion, 4, "seen"})};
+        pools_ = {QueryPool{}, *bench_.device().create_query_pool({QueryType::timestamp, 4, "times"}),
+                  *bench_.device().create_query_pool({QueryType::occlusion, 4, "seen"})};
     }
 
     void step() {
         switch (pick(26)) {
-            case 0: keep(buffers_, bench_.device().create_buffer({pick(3) ? pick(2048) : ~0ull >> pick(64), static_cast<BufferUsage>(pick(128)), static_cast<MemoryKind>(pick(3)), "b"})); break;
+            case 0:
+                keep(buffers_, bench_.device().create_buffer({pick(3) ? pick(2048) : ~0ull >> pick(64),
+                                                              static_cast<BufferUsage>(pick(128)),
+                                                              static_cast<MemoryKind>(pick(3)), "b"}));
+                break;
             case 1: {
                 TextureDesc desc;
                 desc.dimension = static_cast<TextureDimension>(pick(4));
                 desc.format = pick(3) ? Format::rgba8_unorm : static_cast<Format>(pick(format_count));
-                desc.width = pick(20), desc.height = pick(20), desc.depth = pick(3), desc.layers = pick(8), desc.mips = pick(4);
+                desc.width = pick(20), desc.height = pick(20), desc.depth = pick(3), desc.layers = pick(8),
+                desc.mips = pick(4);
                 desc.samples = pick(5) ? 1 : 4;
                 desc.usage = static_cast<TextureUsage>(pick(64));
                 keep(textures_, bench_.device().create_texture(desc));
                 break;
             }
-            case 2: keep(groups_, bench_.device().create_bind_group({.layout = *bench_.device().bind_group_layout(compute_, 0), .entries = {{.binding = pick(3), .buffer = buffer(), .offset = pick(3) * 128, .size = pick(2) ? ~0ull : pick(512)}, {.binding = pick(3), .texture = view(), .sampler = sampler_}}, .name = "g"})); break;
-            case 3: if (pick(4) == 0) bench_.device().destroy(buffer()); break;
-            case 4: if (pick(4) == 0) bench_.device().destroy(texture()); break;
-            case 5: if (pick(4) == 0) bench_.device().destroy(group()); break;
-            case 6: case 7: submit(); break;
-            case 8: list_.begin_render_pass({.color = {{.view = view(), .load = static_cast<LoadOperation>(pick(3)), .resolve = pick(4) ? TextureView() : view()}}, .depth_stencil = {.view = pick(2) ? TextureView() : view(), .read_only = pick(2) == 0}}); break;
+            case 2:
+                keep(groups_, bench_.device().create_bind_group(
+                                  {.layout = *bench_.device().bind_group_layout(compute_, 0),
+                                   .entries = {{.binding = pick(3),
+                                                .buffer = buffer(),
+                                                .offset = pick(3) * 128,
+                                                .size = pick(2) ? ~0ull : pick(512)},
+                                               {.binding = pick(3), .texture = view(), .sampler = sampler_}},
+                                   .name = "g"}));
+                break;
+            case 3:
+                if (pick(4) == 0) bench_.device().destroy(buffer());
+                break;
+            case 4:
+                if (pick(4) == 0) bench_.device().destroy(texture());
+                break;
+            case 5:
+                if (pick(4) == 0) bench_.device().destroy(group());
+                break;
+            case 6:
+            case 7: submit(); break;
+            case 8:
+                list_.begin_render_pass(
+                    {.color = {{.view = view(),
+                                .load = static_cast<LoadOperation>(pick(3)),
+                                .resolve = pick(4) ? TextureView() : view()}},
+                     .depth_stencil = {.view = pick(2) ? TextureView() : view(), .read_only = pick(2) == 0}});
+                break;
             case 9: list_.end_render_pass(); break;
             case 10: pick(2) ? list_.set_pipeline(compute_) : list_.set_pipeline(graphics_); break;
             case 11: list_.set_bind_group(pick(10) ? 0 : pick(40), group()); break;
@@ -53,10 +85,20 @@ class RandomCalls {
             case 14: list_.draw({pick(4), pick(3), pick(4), pick(2)}); break;
             case 15: list_.dispatch({pick(3), pick(3), 1}); break;
             case 16: list_.dispatch_indirect(buffer(), pick(64)); break;
-            case 17: list_.copy_buffer(buffer(), pick(64), buffer(), pick(4) ? pick(64) : ~0ull - pick(8), pick(300)); break;
+            case 17:
+                list_.copy_buffer(buffer(), pick(64), buffer(), pick(4) ? pick(64) : ~0ull - pick(8), pick(300));
+                break;
             case 18: list_.copy_buffer_to_texture(buffer(), texture(), region()); break;
             case 19: list_.copy_texture_to_buffer(texture(), buffer(), region()); break;
-            case 20: list_.copy_texture(texture(), texture(), {.source_mip = pick(3), .source_layer = pick(4), .destination_mip = pick(3), .destination_layer = pick(4), .extent = {pick(6), pick(6), pick(2)}, .layer_count = pick(3)}); break;
+            case 20:
+                list_.copy_texture(texture(), texture(),
+                                   {.source_mip = pick(3),
+                                    .source_layer = pick(4),
+                                    .destination_mip = pick(3),
+                                    .destination_layer = pick(4),
+                                    .extent = {pick(6), pick(6), pick(2)},
+                                    .layer_count = pick(3)});
+                break;
             case 21: list_.fill_buffer(buffer(), 1, pick(16) * 4, pick(2) ? ~0ull : pick(512)); break;
             case 22: pick(2) ? list_.clear_texture(view(), {}) : list_.clear_depth_stencil(view(), 1.0f); break;
             case 23: list_.write_timestamp(pools_[pick(3)], pick(5)); break;
@@ -109,8 +151,10 @@ class RandomCalls {
     }
     void content() {
         const Buffer target = buffer();
-        if (pick(2)) (void)bench_.device().write_buffer(target, std::vector<std::byte>(pick(300)), pick(300));
-        else (void)bench_.device().read_buffer(target, pick(300), pick(2) ? ~0ull : pick(300));
+        if (pick(2))
+            (void)bench_.device().write_buffer(target, std::vector<std::byte>(pick(300)), pick(300));
+        else
+            (void)bench_.device().read_buffer(target, pick(300), pick(2) ? ~0ull : pick(300));
         const Texture image = texture();
         if (pick(2)) (void)bench_.device().write_texture(image, std::vector<std::byte>(pick(2048)), pick(3), pick(3));
         if (const auto mapped = bench_.device().map(target)) (void)bench_.device().unmap(target);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Samplers against closed forms. Sampled in compute shaders with explicit levels, so every device can.
-#include "tests/rhi/backend_test.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "tests/rhi/backend_test.h"
 
 namespace nacre::test {
 namespace {
@@ -18,7 +18,8 @@ std::string row_shader(const std::string& type = "sampler2D") {
         layout(local_size_x = 1) in;
         layout(push_constant) uniform Row { float first; float step; float v; float lod; int count; };
         layout(set = 0, binding = 0) buffer Result { vec4 result[]; };
-        layout(set = 0, binding = 1) uniform )" + type + R"( image;
+        layout(set = 0, binding = 1) uniform )" +
+           type + R"( image;
         void main() {
             for (int i = 0; i < count; ++i) result[i] = textureLod(image, vec2(first + step * float(i), v), lod);
         }
@@ -37,7 +38,8 @@ class SamplerRows : public BackendTest {
         const Buffer result = buffer(static_cast<std::uint64_t>(row.count) * 16, BufferUsage::storage);
         CommandList list = device().create_command_list("row");
         list.set_pipeline(pipeline);
-        list.set_bind_group(0, group(pipeline, {{.binding = 0, .buffer = result}, {.binding = 1, .texture = texture, .sampler = sampler(desc)}}));
+        list.set_bind_group(0, group(pipeline, {{.binding = 0, .buffer = result},
+                                                {.binding = 1, .texture = texture, .sampler = sampler(desc)}}));
         list.set_push_constants(row);
         list.dispatch({});
         run(std::move(list));
@@ -73,15 +75,22 @@ float address(AddressMode mode, int i, bool& border) {
 
 TEST_P(SamplerRows, AddressModesWithNearestFilter) {
     const Texture texture = ramp();
-    for (const AddressMode mode : {AddressMode::repeat, AddressMode::mirrored_repeat, AddressMode::clamp_to_edge, AddressMode::clamp_to_border}) {
+    for (const AddressMode mode : {AddressMode::repeat, AddressMode::mirrored_repeat, AddressMode::clamp_to_edge,
+                                   AddressMode::clamp_to_border}) {
         if (mode == AddressMode::clamp_to_border && !capabilities().border_color) continue;
-        const auto values = sample(texture, {.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest,
-                                             .address_u = mode, .address_v = mode, .border = BorderColor::opaque_white},
+        const auto values = sample(texture,
+                                   {.magnify = Filter::nearest,
+                                    .minify = Filter::nearest,
+                                    .mip = Filter::nearest,
+                                    .address_u = mode,
+                                    .address_v = mode,
+                                    .border = BorderColor::opaque_white},
                                    {-2.875f, 0.25f, 0.5f, 0.0f, 24});
         for (int i = 0; i < 24; ++i) {
             bool border = false;
             const float texel = address(mode, i - 12, border);
-            EXPECT_NEAR(values[static_cast<std::size_t>(i)][0], border ? 1.0f : texel * unit, 1e-5f) << "mode " << static_cast<int>(mode) << " at " << i;
+            EXPECT_NEAR(values[static_cast<std::size_t>(i)][0], border ? 1.0f : texel * unit, 1e-5f)
+                << "mode " << static_cast<int>(mode) << " at " << i;
         }
     }
 }
@@ -89,14 +98,16 @@ TEST_P(SamplerRows, AddressModesWithNearestFilter) {
 TEST_P(SamplerRows, LinearFilterWeighsTwoTexels) {
     const Texture texture = ramp();
     for (const AddressMode mode : {AddressMode::repeat, AddressMode::clamp_to_edge}) {
-        const auto values = sample(texture, {.mip = Filter::nearest, .address_u = mode, .address_v = AddressMode::clamp_to_edge},
-                                   {-0.5f, 1.0f / 32.0f, 0.5f, 0.0f, 64});
+        const auto values =
+            sample(texture, {.mip = Filter::nearest, .address_u = mode, .address_v = AddressMode::clamp_to_edge},
+                   {-0.5f, 1.0f / 32.0f, 0.5f, 0.0f, 64});
         for (int i = 0; i < 64; ++i) {
             const float x = (-0.5f + static_cast<float>(i) / 32.0f) * 4.0f - 0.5f;
             const int left = static_cast<int>(std::floor(x));
             const float weight = x - static_cast<float>(left);
             bool border = false;
-            const float expected = address(mode, left, border) * (1 - weight) + address(mode, left + 1, border) * weight;
+            const float expected =
+                address(mode, left, border) * (1 - weight) + address(mode, left + 1, border) * weight;
             // Filter weights have 8 bits.
             EXPECT_NEAR(values[static_cast<std::size_t>(i)][0], expected * unit, 3.0f * unit / 256.0f + 2e-3f) << i;
         }
@@ -107,9 +118,15 @@ TEST_P(SamplerRows, BorderColors) {
     SKIP_WITHOUT(capabilities().border_color);
     const Texture texture = ramp();
     const std::array<std::array<float, 4>, 3> colors{{{0, 0, 0, 0}, {0, 0, 0, 1}, {1, 1, 1, 1}}};
-    for (const BorderColor border : {BorderColor::transparent_black, BorderColor::opaque_black, BorderColor::opaque_white}) {
-        const auto values = sample(texture, {.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest,
-                                             .address_u = AddressMode::clamp_to_border, .address_v = AddressMode::clamp_to_border, .border = border},
+    for (const BorderColor border :
+         {BorderColor::transparent_black, BorderColor::opaque_black, BorderColor::opaque_white}) {
+        const auto values = sample(texture,
+                                   {.magnify = Filter::nearest,
+                                    .minify = Filter::nearest,
+                                    .mip = Filter::nearest,
+                                    .address_u = AddressMode::clamp_to_border,
+                                    .address_v = AddressMode::clamp_to_border,
+                                    .border = border},
                                    {-0.5f, 2.0f, 0.5f, 0.0f, 2});
         EXPECT_EQ(values[0], colors[static_cast<std::size_t>(border)]);
         EXPECT_EQ(values[1], colors[static_cast<std::size_t>(border)]);
@@ -117,8 +134,12 @@ TEST_P(SamplerRows, BorderColors) {
 }
 
 TEST_P(SamplerRows, MipsAreChosenBlendedAndClamped) {
-    const TextureDesc desc{.format = Format::rgba8_unorm, .width = 8, .height = 8, .mips = 4,
-                           .usage = TextureUsage::sampled | TextureUsage::copy_destination, .name = "mips"};
+    const TextureDesc desc{.format = Format::rgba8_unorm,
+                           .width = 8,
+                           .height = 8,
+                           .mips = 4,
+                           .usage = TextureUsage::sampled | TextureUsage::copy_destination,
+                           .name = "mips"};
     const Texture texture = ok(device().create_texture(desc));
     for (std::uint32_t mip = 0; mip < 4; ++mip) {
         const std::vector<std::uint8_t> texels(mip_bytes(desc, mip), static_cast<std::uint8_t>(60 * mip));
@@ -131,13 +152,18 @@ TEST_P(SamplerRows, MipsAreChosenBlendedAndClamped) {
         const float clamped = std::clamp(lod, 0.0f, 3.0f);
         EXPECT_NEAR(at({.mip = Filter::linear}, lod), clamped, 0.03f) << lod;
         EXPECT_NEAR(at({.mip = Filter::nearest}, lod), std::ceil(clamped + 0.5f) - 1.0f, 0.01f) << lod;
-        EXPECT_NEAR(at({.mip = Filter::linear, .min_lod = 0.5f, .max_lod = 2.0f}, lod), std::clamp(lod, 0.5f, 2.0f), 0.03f) << lod;
+        EXPECT_NEAR(at({.mip = Filter::linear, .min_lod = 0.5f, .max_lod = 2.0f}, lod), std::clamp(lod, 0.5f, 2.0f),
+                    0.03f)
+            << lod;
     }
 }
 
 TEST_P(SamplerRows, ComparisonOfDepth) {
-    const TextureDesc desc{.format = Format::d32_float, .width = 4, .height = 1,
-                           .usage = TextureUsage::sampled | TextureUsage::depth_target | TextureUsage::copy_destination, .name = "depth"};
+    const TextureDesc desc{.format = Format::d32_float,
+                           .width = 4,
+                           .height = 1,
+                           .usage = TextureUsage::sampled | TextureUsage::depth_target | TextureUsage::copy_destination,
+                           .name = "depth"};
     const Texture texture = ok(device().create_texture(desc));
     const std::array<float, 4> depths{0.125f, 0.25f, 0.5f, 0.75f};
     ok(device().write_texture(texture, std::as_bytes(std::span(depths))));
@@ -152,27 +178,41 @@ TEST_P(SamplerRows, ComparisonOfDepth) {
     )");
     // The reference 0.5 against each depth.
     const std::array<std::pair<CompareOperation, std::array<float, 4>>, 8> cases{{
-        {CompareOperation::never, {0, 0, 0, 0}}, {CompareOperation::less, {0, 0, 0, 1}},
-        {CompareOperation::equal, {0, 0, 1, 0}}, {CompareOperation::less_or_equal, {0, 0, 1, 1}},
-        {CompareOperation::greater, {1, 1, 0, 0}}, {CompareOperation::not_equal, {1, 1, 0, 1}},
-        {CompareOperation::greater_or_equal, {1, 1, 1, 0}}, {CompareOperation::always, {1, 1, 1, 1}},
+        {CompareOperation::never, {0, 0, 0, 0}},
+        {CompareOperation::less, {0, 0, 0, 1}},
+        {CompareOperation::equal, {0, 0, 1, 0}},
+        {CompareOperation::less_or_equal, {0, 0, 1, 1}},
+        {CompareOperation::greater, {1, 1, 0, 0}},
+        {CompareOperation::not_equal, {1, 1, 0, 1}},
+        {CompareOperation::greater_or_equal, {1, 1, 1, 0}},
+        {CompareOperation::always, {1, 1, 1, 1}},
     }};
     for (const auto& [operation, expected] : cases) {
         const Buffer result = buffer(16, BufferUsage::storage);
         dispatch(pipeline, {{.binding = 0, .buffer = result},
-                            {.binding = 1, .texture = texture,
-                             .sampler = sampler({.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest,
-                                                 .address_u = AddressMode::clamp_to_edge, .address_v = AddressMode::clamp_to_edge,
-                                                 .comparison = true, .compare = operation})}});
-        EXPECT_EQ(read<float>(result), (std::vector<float>(expected.begin(), expected.end()))) << static_cast<int>(operation);
+                            {.binding = 1,
+                             .texture = texture,
+                             .sampler = sampler({.magnify = Filter::nearest,
+                                                 .minify = Filter::nearest,
+                                                 .mip = Filter::nearest,
+                                                 .address_u = AddressMode::clamp_to_edge,
+                                                 .address_v = AddressMode::clamp_to_edge,
+                                                 .comparison = true,
+                                                 .compare = operation})}});
+        EXPECT_EQ(read<float>(result), (std::vector<float>(expected.begin(), expected.end())))
+            << static_cast<int>(operation);
     }
 }
 
 TEST_P(SamplerRows, AnisotropySharpensAlongOneAxis) {
     SKIP_WITHOUT(capabilities().anisotropic_filtering);
     // Rows alternate, so what is sampled tells whether the small or the large axis chose the mip.
-    const TextureDesc desc{.format = Format::rgba8_unorm, .width = 64, .height = 64, .mips = 7,
-                           .usage = TextureUsage::sampled | TextureUsage::copy_destination, .name = "stripes"};
+    const TextureDesc desc{.format = Format::rgba8_unorm,
+                           .width = 64,
+                           .height = 64,
+                           .mips = 7,
+                           .usage = TextureUsage::sampled | TextureUsage::copy_destination,
+                           .name = "stripes"};
     const Texture texture = ok(device().create_texture(desc));
     for (std::uint32_t mip = 0; mip < 7; ++mip) {
         const std::vector<std::uint8_t> texels(mip_bytes(desc, mip), static_cast<std::uint8_t>(mip * 40));
@@ -186,7 +226,8 @@ TEST_P(SamplerRows, AnisotropySharpensAlongOneAxis) {
     )");
     const auto level = [&](float anisotropy) {
         const Buffer result = buffer(4, BufferUsage::storage);
-        dispatch(pipeline, {{.binding = 0, .buffer = result}, {.binding = 1, .texture = texture, .sampler = sampler({.max_anisotropy = anisotropy})}});
+        dispatch(pipeline, {{.binding = 0, .buffer = result},
+                            {.binding = 1, .texture = texture, .sampler = sampler({.max_anisotropy = anisotropy})}});
         return read<float>(result)[0];
     };
     EXPECT_NEAR(level(1.0f), 3.0f, 0.1f);
@@ -198,7 +239,9 @@ TEST_P(Samplers, CoordinatesBeginAtTheTopLeft) {
     const std::array<std::uint32_t, 4> texels{0xff000000u, 0xff000040u, 0xff000080u, 0xff0000c0u};
     const Texture written = texture_of<std::uint32_t>(Format::rgba8_unorm, 2, 2, texels);
     const Texture drawn = target(Format::rgba8_unorm, 2, 2, "drawn", TextureUsage::sampled);
-    cover(drawn, "layout(location = 0) out vec4 color; void main() { color = vec4((floor(gl_FragCoord.x) * 64.0 + floor(gl_FragCoord.y) * 128.0) / 255.0, 0, 0, 1); }");
+    cover(drawn,
+          "layout(location = 0) out vec4 color; void main() { color = vec4((floor(gl_FragCoord.x) * 64.0 + "
+          "floor(gl_FragCoord.y) * 128.0) / 255.0, 0, 0, 1); }");
     EXPECT_EQ(read<std::uint32_t>(drawn), std::vector<std::uint32_t>(texels.begin(), texels.end()));
     const std::string body = R"(
         layout(local_size_x = 1) in;
@@ -223,7 +266,8 @@ TEST_P(Samplers, GatherTakesFourTexels) {
         layout(set = 0, binding = 0) buffer Result { vec4 result; };
         layout(set = 0, binding = 1) uniform sampler2D image;
         void main() { result = textureGather(image, vec2(0.5)); }
-    )", 4, {{.binding = 1, .texture = texture, .sampler = nearest()}});
+    )",
+                                        4, {{.binding = 1, .texture = texture, .sampler = nearest()}});
     EXPECT_EQ(values, (std::vector<float>{3, 4, 2, 1}));
 }
 

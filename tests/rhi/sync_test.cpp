@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Order, fences and threads: what may happen at the same time, and that the result does not depend on it.
-#include "tests/rhi/backend_test.h"
-
 #include <atomic>
 #include <limits>
 #include <thread>
+
+#include "tests/rhi/backend_test.h"
 
 namespace nacre::test {
 namespace {
@@ -25,8 +25,12 @@ struct Step {
 
 TEST_P(Sync, WritesPassesCopiesAndDispatchesFollowOneAnother) {
     // Each step needs what the one before wrote, through another kind of access each time.
-    const Texture picture = target(Format::rgba8_unorm, 64, 1, "picture", TextureUsage::sampled | TextureUsage::copy_destination);
-    const Buffer bytes = buffer(256, BufferUsage::copy_source | BufferUsage::copy_destination | BufferUsage::storage | BufferUsage::uniform | BufferUsage::vertex, "bytes");
+    const Texture picture =
+        target(Format::rgba8_unorm, 64, 1, "picture", TextureUsage::sampled | TextureUsage::copy_destination);
+    const Buffer bytes = buffer(256,
+                                BufferUsage::copy_source | BufferUsage::copy_destination | BufferUsage::storage |
+                                    BufferUsage::uniform | BufferUsage::vertex,
+                                "bytes");
     const ComputePipeline add = compute(add_shader);
     const BindGroup values = group(add, {{.binding = 0, .buffer = bytes}});
     const GraphicsPipelineDesc desc = fullscreen_desc(R"(
@@ -36,28 +40,29 @@ TEST_P(Sync, WritesPassesCopiesAndDispatchesFollowOneAnother) {
             uint i = uint(gl_FragCoord.x);
             color = unpackUnorm4x8(values[i / 4u][i % 4u]);
         }
-    )", {{.format = Format::rgba8_unorm}});
+    )",
+                                                      {{.format = Format::rgba8_unorm}});
     const GraphicsPipeline show = ok(device().create_graphics_pipeline(desc));
     const BindGroup as_uniform = group(show, {{.binding = 0, .buffer = bytes}});
     CommandList list = device().create_command_list("chain");
-    list.fill_buffer(bytes, 1);                                // copy write
+    list.fill_buffer(bytes, 1);  // copy write
     list.set_pipeline(add);
     list.set_bind_group(0, values);
     list.set_push_constants(Step{3, 2});
-    list.dispatch({});                                         // storage write: 5
+    list.dispatch({});  // storage write: 5
     list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::discard}}});
     list.set_pipeline(show);
     list.set_bind_group(0, as_uniform);
-    list.draw({.vertex_count = 3});                            // uniform read, color write
+    list.draw({.vertex_count = 3});  // uniform read, color write
     list.end_render_pass();
     list.set_pipeline(add);
     list.set_bind_group(0, values);
     list.set_push_constants(Step{0, 77});
-    list.dispatch({});                                         // write after read: 77
-    list.copy_texture_to_buffer(picture, bytes);               // copy over it: 5 again
+    list.dispatch({});                            // write after read: 77
+    list.copy_texture_to_buffer(picture, bytes);  // copy over it: 5 again
     list.set_push_constants(Step{10, 1});
-    list.dispatch({});                                         // 51
-    list.copy_buffer_to_texture(bytes, picture);               // copy read, copy write
+    list.dispatch({});                            // 51
+    list.copy_buffer_to_texture(bytes, picture);  // copy read, copy write
     run(std::move(list));
     for (const std::uint32_t texel : read<std::uint32_t>(picture)) EXPECT_EQ(texel, 51u);
     for (const std::uint32_t value : read<std::uint32_t>(bytes)) EXPECT_EQ(value, 51u);
@@ -104,7 +109,10 @@ TEST_P(Sync, ContentWritesComeBeforeTheNextSubmission) {
 TEST_P(Sync, ListsRecordedByThreadsGiveOnePicture) {
     constexpr std::uint32_t threads = 4;
     const Texture picture = target(Format::r32_uint, 16, 16);
-    const GraphicsPipelineDesc desc = fullscreen_desc("layout(push_constant) uniform P { uint value; }; layout(location = 0) out uvec4 color; void main() { color = uvec4(value); }", {{.format = Format::r32_uint}});
+    const GraphicsPipelineDesc desc = fullscreen_desc(
+        "layout(push_constant) uniform P { uint value; }; layout(location = 0) out uvec4 color; void main() { color = "
+        "uvec4(value); }",
+        {{.format = Format::r32_uint}});
     const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc));
     std::vector<CommandList> lists;
     for (std::uint32_t i = 0; i < threads; ++i) lists.push_back(device().create_command_list("part"));
@@ -113,7 +121,8 @@ TEST_P(Sync, ListsRecordedByThreadsGiveOnePicture) {
         for (std::uint32_t i = 0; i < threads; ++i)
             recorders.emplace_back([&, i] {
                 CommandList& list = lists[i];
-                list.begin_render_pass({.color = {{.view = picture, .load = i == 0 ? LoadOperation::clear : LoadOperation::load}}});
+                list.begin_render_pass(
+                    {.color = {{.view = picture, .load = i == 0 ? LoadOperation::clear : LoadOperation::load}}});
                 list.set_pipeline(pipeline);
                 for (std::uint32_t row = 0; row < 16; ++row) {
                     // Later lists cover what earlier ones drew from their column on.
@@ -139,10 +148,12 @@ TEST_P(Sync, ThreadsCreateSubmitAndDestroyAtOnce) {
         for (int thread = 0; thread < threads; ++thread)
             workers.emplace_back([&, thread] {
                 for (int round = 0; round < rounds; ++round) {
-                    const auto made = device().create_buffer({256, BufferUsage::storage | BufferUsage::copy_destination, MemoryKind::device, "own"});
+                    const auto made = device().create_buffer(
+                        {256, BufferUsage::storage | BufferUsage::copy_destination, MemoryKind::device, "own"});
                     if (!made) return;
                     const auto layout = device().bind_group_layout(add, 0);
-                    const auto bound = device().create_bind_group({.layout = *layout, .entries = {{.binding = 0, .buffer = *made}}, .name = "own"});
+                    const auto bound = device().create_bind_group(
+                        {.layout = *layout, .entries = {{.binding = 0, .buffer = *made}}, .name = "own"});
                     if (!bound) return;
                     const std::vector<std::uint32_t> start(64, static_cast<std::uint32_t>(thread));
                     if (!device().write_buffer(*made, std::as_bytes(std::span(start)))) return;
@@ -159,7 +170,8 @@ TEST_P(Sync, ThreadsCreateSubmitAndDestroyAtOnce) {
                     device().destroy(*made);
                     if (!bytes) return;
                     bool all = true;
-                    for (const std::uint32_t value : cast<std::uint32_t>(*bytes)) all &= value == static_cast<std::uint32_t>(thread * 10 + round);
+                    for (const std::uint32_t value : cast<std::uint32_t>(*bytes))
+                        all &= value == static_cast<std::uint32_t>(thread * 10 + round);
                     right += all;
                 }
             });
@@ -171,7 +183,8 @@ TEST_P(Sync, ObjectsAreDestroyedWhileTheyAreInUse) {
     const ComputePipeline add = compute(add_shader);
     const Buffer kept = buffer(256, BufferUsage::copy_destination);
     {
-        const Buffer bytes = buffer(256, BufferUsage::storage | BufferUsage::copy_source | BufferUsage::copy_destination);
+        const Buffer bytes =
+            buffer(256, BufferUsage::storage | BufferUsage::copy_source | BufferUsage::copy_destination);
         const BindGroup values = group(add, {{.binding = 0, .buffer = bytes}});
         CommandList list = device().create_command_list("in use");
         list.fill_buffer(bytes, 4);
@@ -224,7 +237,11 @@ TEST_P(Faults, LostDeviceFailsEveryCallAndANewOneWorks) {
     EXPECT_EQ(lost->wait_idle().error().code, ErrorCode::device_lost);
     EXPECT_EQ(lost->read_buffer(bytes).error().code, ErrorCode::device_lost);
     EXPECT_EQ(lost->create_sampler({}).error().code, ErrorCode::device_lost);
-    EXPECT_EQ(lost->create_texture({.format = Format::rgba8_unorm, .width = 4, .height = 4, .usage = TextureUsage::sampled}).error().code, ErrorCode::device_lost);
+    EXPECT_EQ(
+        lost->create_texture({.format = Format::rgba8_unorm, .width = 4, .height = 4, .usage = TextureUsage::sampled})
+            .error()
+            .code,
+        ErrorCode::device_lost);
     lost->destroy(bytes);
     const auto fresh = make_device(device_desc());
     const Buffer again = ok(fresh->create_buffer({64, BufferUsage::copy_destination, MemoryKind::device, "again"}));
@@ -252,7 +269,11 @@ TEST_P(Faults, EachAllocationMayFail) {
         };
         const auto buffer = weak.create_buffer({1 << 20, BufferUsage::storage, MemoryKind::device, "one"});
         look(buffer);
-        const auto texture = weak.create_texture({.format = Format::rgba8_unorm, .width = 512, .height = 512, .usage = TextureUsage::sampled | TextureUsage::copy_source, .name = "two"});
+        const auto texture = weak.create_texture({.format = Format::rgba8_unorm,
+                                                  .width = 512,
+                                                  .height = 512,
+                                                  .usage = TextureUsage::sampled | TextureUsage::copy_source,
+                                                  .name = "two"});
         look(texture);
         if (buffer) look(weak.write_buffer(*buffer, std::vector<std::byte>(2 << 20 >> 1)));
         if (buffer) look(weak.read_buffer(*buffer));
@@ -270,11 +291,16 @@ TEST_P(Faults, EachAllocationMayFail) {
 TEST_P(Faults, ImpossibleSizesAreErrorsWithFigures) {
     expect_message("N-201");
     expect_message("N-211");
-    const auto buffer = device().create_buffer({std::uint64_t{1} << 63, BufferUsage::storage, MemoryKind::device, "huge"});
+    const auto buffer =
+        device().create_buffer({std::uint64_t{1} << 63, BufferUsage::storage, MemoryKind::device, "huge"});
     ASSERT_FALSE(buffer);
     EXPECT_EQ(buffer.error().code, ErrorCode::out_of_memory);
     EXPECT_NE(buffer.error().message().find("9223372036854775808"), std::string::npos) << buffer.error().message();
-    const auto texture = device().create_texture({.format = Format::rgba8_unorm, .width = 1000000, .height = 1000000, .usage = TextureUsage::sampled, .name = "huge"});
+    const auto texture = device().create_texture({.format = Format::rgba8_unorm,
+                                                  .width = 1000000,
+                                                  .height = 1000000,
+                                                  .usage = TextureUsage::sampled,
+                                                  .name = "huge"});
     ASSERT_FALSE(texture);
     EXPECT_NE(texture.error().message().find("1000000"), std::string::npos) << texture.error().message();
     EXPECT_NE(texture.error().message().find("max_texture_2d"), std::string::npos) << texture.error().message();
@@ -284,7 +310,8 @@ TEST_P(Faults, OutOfRangeAccessesReadZeroOrStayInside) {
     const std::array<std::uint32_t, 4> values{1, 2, 3, 4};
     const Buffer small = buffer_of<std::uint32_t>(values, BufferUsage::storage);
     const Texture texture = texture_of<std::uint32_t>(Format::r32_uint, 2, 2, values);
-    const auto result = evaluate<std::uint32_t>(R"(
+    const auto result = evaluate<std::uint32_t>(
+        R"(
         layout(local_size_x = 1) in;
         layout(set = 0, binding = 0) buffer Result { uint result[4]; };
         layout(set = 0, binding = 1) buffer Small { uint small_values[]; };
@@ -295,7 +322,8 @@ TEST_P(Faults, OutOfRangeAccessesReadZeroOrStayInside) {
             small_values[2000000] = 99u;
             result[2] = small_values[3];
         }
-    )", 4, {{.binding = 1, .buffer = small}, {.binding = 2, .texture = texture, .sampler = nearest()}});
+    )",
+        4, {{.binding = 1, .buffer = small}, {.binding = 2, .texture = texture, .sampler = nearest()}});
     EXPECT_TRUE(result[0] <= 4) << result[0];
     EXPECT_TRUE(result[1] <= 4) << result[1];
     EXPECT_EQ(result[2], 4u);
@@ -313,7 +341,8 @@ TEST_P(Faults, IntegerDivisionAndShiftsHaveNoTraps) {
             result[0] = 7 / zero; result[1] = lowest / minus_one; result[2] = 7 % zero; result[3] = 1 << forty;
             result[4] = int(intBitsToFloat(0x7fc00000)); result[5] = 1234;
         }
-    )", 6, {{.binding = 1, .buffer = inputs}});
+    )",
+                                               6, {{.binding = 1, .buffer = inputs}});
     EXPECT_EQ(result[5], 1234);
 }
 
@@ -324,7 +353,8 @@ TEST_P(Faults, StrangeTrianglesStayInsideTheTarget) {
         layout(push_constant) uniform P { vec4 a; vec4 b; vec4 c; };
         void main() { gl_Position = gl_VertexIndex == 0 ? a : gl_VertexIndex == 1 ? b : c; }
     )");
-    desc.fragment = shader(ShaderStage::fragment, "layout(location = 0) out vec4 color; void main() { color = vec4(1); }");
+    desc.fragment =
+        shader(ShaderStage::fragment, "layout(location = 0) out vec4 color; void main() { color = vec4(1); }");
     desc.color_targets = {{.format = Format::r8_unorm}};
     const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc));
     const float nan = std::numeric_limits<float>::quiet_NaN(), infinite = std::numeric_limits<float>::infinity();
@@ -334,9 +364,10 @@ TEST_P(Faults, StrangeTrianglesStayInsideTheTarget) {
     CommandList list = device().create_command_list("strange");
     list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear}}});
     list.set_pipeline(pipeline);
-    for (const Corners& corners : {Corners{{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}}, Corners{{1e30f, 0, 0, 1, -1e30f, 5, 0, 1, 0, -1e30f, 0, 1}},
-                                   Corners{{0, 0, 0, 0, 1, 0, 0, -1, 0, 1, 0, -5}}, Corners{{nan, 0, 0, 1, 1, nan, 0, 1, 0, 1, 0, nan}},
-                                   Corners{{infinite, 0, 0, 1, 1, -infinite, 0, 1, 0, 1, infinite, 1}}}) {
+    for (const Corners& corners :
+         {Corners{{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}}, Corners{{1e30f, 0, 0, 1, -1e30f, 5, 0, 1, 0, -1e30f, 0, 1}},
+          Corners{{0, 0, 0, 0, 1, 0, 0, -1, 0, 1, 0, -5}}, Corners{{nan, 0, 0, 1, 1, nan, 0, 1, 0, 1, 0, nan}},
+          Corners{{infinite, 0, 0, 1, 1, -infinite, 0, 1, 0, 1, infinite, 1}}}) {
         list.set_push_constants(corners);
         list.draw({.vertex_count = 3});
     }
@@ -347,7 +378,8 @@ TEST_P(Faults, StrangeTrianglesStayInsideTheTarget) {
 
 TEST_P(Faults, EmptyWorkIsNoError) {
     const Texture picture = target(Format::r8_unorm, 4, 4);
-    const GraphicsPipeline pipeline = fullscreen("layout(location = 0) out vec4 color; void main() { color = vec4(1); }", Format::r8_unorm);
+    const GraphicsPipeline pipeline =
+        fullscreen("layout(location = 0) out vec4 color; void main() { color = vec4(1); }", Format::r8_unorm);
     CommandList list = device().create_command_list("empty");
     list.copy_buffer(buffer(16, BufferUsage::copy_source), 0, buffer(16, BufferUsage::copy_destination), 0, 0);
     list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear}}});
@@ -367,7 +399,8 @@ TEST_P(Restrictions, AllValuesAreAtMostThoseOfTheMinimum) {
     desc.restriction = "gles31-minimum";
     const auto weak = make_device(desc);
     const Capabilities& c = weak->capabilities();
-    EXPECT_FALSE(c.storage_in_fragment || c.storage_in_vertex || c.dual_source_blending || c.independent_blend || c.descriptor_indexing);
+    EXPECT_FALSE(c.storage_in_fragment || c.storage_in_vertex || c.dual_source_blending || c.independent_blend ||
+                 c.descriptor_indexing);
     EXPECT_FALSE(c.float_color_targets || c.texture_views || c.border_color || c.cube_arrays);
     EXPECT_LE(c.max_color_targets, 4u);
     EXPECT_LE(c.max_texture_2d, 2048u);
@@ -387,11 +420,16 @@ TEST_P(Restrictions, WhatIsBeyondIsRefusedAsOnAWeakDevice) {
     desc.restriction = "gles31-minimum";
     const auto weak = make_device(desc);
     for (const char* code : {"N-403", "N-211", "N-217", "N-428", "N-304"}) expect_message(code);
-    EXPECT_FALSE(weak->create_shader(compile(ShaderStage::fragment, "layout(set = 0, binding = 0) buffer R { uint r; }; void main() { atomicAdd(r, 1u); }")));
-    EXPECT_FALSE(weak->create_texture({.format = Format::rgba8_unorm, .width = 4096, .height = 4, .usage = TextureUsage::sampled}));
-    EXPECT_FALSE(weak->create_texture({.format = Format::rgba16_float, .width = 4, .height = 4, .usage = TextureUsage::color_target}));
+    EXPECT_FALSE(weak->create_shader(
+        compile(ShaderStage::fragment,
+                "layout(set = 0, binding = 0) buffer R { uint r; }; void main() { atomicAdd(r, 1u); }")));
+    EXPECT_FALSE(weak->create_texture(
+        {.format = Format::rgba8_unorm, .width = 4096, .height = 4, .usage = TextureUsage::sampled}));
+    EXPECT_FALSE(weak->create_texture(
+        {.format = Format::rgba16_float, .width = 4, .height = 4, .usage = TextureUsage::color_target}));
     EXPECT_FALSE(weak->create_shader(compile(ShaderStage::compute, "layout(local_size_x = 256) in; void main() {}")));
-    EXPECT_FALSE(weak->create_bind_group_layout({.bindings = {{0, BindingType::sampled_texture, 0, ShaderStage::fragment}}, .name = "unbounded"}));
+    EXPECT_FALSE(weak->create_bind_group_layout(
+        {.bindings = {{0, BindingType::sampled_texture, 0, ShaderStage::fragment}}, .name = "unbounded"}));
 }
 
 }  // namespace

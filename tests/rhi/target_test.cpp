@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Render passes: several samples, depth, stencil, viewports, scissors, and what is kept between passes.
-#include "tests/rhi/backend_test.h"
-
 #include <functional>
+
+#include "tests/rhi/backend_test.h"
 
 namespace nacre::test {
 namespace {
@@ -43,7 +43,10 @@ TEST_P(Targets, FourSamplesAreResolvedToTheirAverage) {
     desc.samples = 4;
     const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc));
     CommandList list = device().create_command_list("samples");
-    list.begin_render_pass({.color = {{.view = samples, .load = LoadOperation::clear, .store = StoreOperation::discard, .resolve = picture}}, .name = "samples"});
+    list.begin_render_pass(
+        {.color =
+             {{.view = samples, .load = LoadOperation::clear, .store = StoreOperation::discard, .resolve = picture}},
+         .name = "samples"});
     list.set_pipeline(pipeline);
     list.draw({.vertex_count = 3});
     list.end_render_pass();
@@ -70,7 +73,8 @@ TEST_P(Targets, SamplesAreReadOneByOne) {
     SKIP_WITHOUT(capabilities().max_samples >= 4 && supports(Format::rgba8_unorm, FormatSupport::multisampled));
     const Texture samples = target(Format::rgba8_unorm, 4, 4, "samples", TextureUsage::sampled, 4);
     CommandList list = device().create_command_list("samples");
-    list.begin_render_pass({.color = {{.view = samples, .load = LoadOperation::clear, .clear = {.floating = {0.2f, 0.4f, 0.6f, 1.0f}}}}});
+    list.begin_render_pass(
+        {.color = {{.view = samples, .load = LoadOperation::clear, .clear = {.floating = {0.2f, 0.4f, 0.6f, 1.0f}}}}});
     list.end_render_pass();
     run(std::move(list));
     const auto values = evaluate<float>(R"(
@@ -78,7 +82,8 @@ TEST_P(Targets, SamplesAreReadOneByOne) {
         layout(set = 0, binding = 0) buffer Result { vec4 result[4]; };
         layout(set = 0, binding = 1) uniform sampler2DMS image;
         void main() { for (int i = 0; i < 4; ++i) result[i] = texelFetch(image, ivec2(1, 2), i); }
-    )", 16, {{.binding = 1, .texture = samples, .sampler = nearest()}});
+    )",
+                                        16, {{.binding = 1, .texture = samples, .sampler = nearest()}});
     for (std::size_t i = 0; i < 4; ++i) {
         EXPECT_NEAR(values[i * 4], 0.2f, 1e-3f);
         EXPECT_NEAR(values[i * 4 + 2], 0.6f, 1e-3f);
@@ -86,9 +91,16 @@ TEST_P(Targets, SamplesAreReadOneByOne) {
 }
 
 TEST_P(Targets, DepthComparisons) {
-    const std::array<std::array<bool, 3>, 8> expected{{  // Depth below, equal to, above what is there.
-        {false, false, false}, {true, false, false}, {false, true, false}, {true, true, false},
-        {false, false, true},  {true, false, true},  {false, true, true},  {true, true, true},
+    const std::array<std::array<bool, 3>, 8> expected{{
+        // Depth below, equal to, above what is there.
+        {false, false, false},
+        {true, false, false},
+        {false, true, false},
+        {true, true, false},
+        {false, false, true},
+        {true, false, true},
+        {false, true, true},
+        {true, true, true},
     }};
     const Texture picture = target(Format::r8_unorm, 2, 2);
     const Texture depth = target(Format::d32_float, 2, 2);
@@ -97,13 +109,17 @@ TEST_P(Targets, DepthComparisons) {
         desc.vertex = shader(ShaderStage::vertex, depth_vertex);
         desc.fragment = shader(ShaderStage::fragment, white);
         desc.color_targets = {{.format = Format::r8_unorm}};
-        desc.depth_stencil = {.format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = static_cast<CompareOperation>(operation)};
+        desc.depth_stencil = {.format = Format::d32_float,
+                              .depth_test = true,
+                              .depth_write = true,
+                              .depth_compare = static_cast<CompareOperation>(operation)};
         const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc));
         for (std::size_t at = 0; at < 3; ++at) {
             const float drawn = at == 0 ? 0.25f : at == 1 ? 0.5f : 0.75f;
             CommandList list = device().create_command_list("depth");
-            list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear}},
-                                    .depth_stencil = {.view = depth, .depth_load = LoadOperation::clear, .clear_depth = 0.5f}});
+            list.begin_render_pass(
+                {.color = {{.view = picture, .load = LoadOperation::clear}},
+                 .depth_stencil = {.view = depth, .depth_load = LoadOperation::clear, .clear_depth = 0.5f}});
             list.set_pipeline(pipeline);
             list.set_push_constants(drawn);
             list.draw({.vertex_count = 3});
@@ -120,7 +136,10 @@ TEST_P(Targets, DepthIsKeptBetweenPassesAndReadWhileTested) {
     const Texture depth = target(Format::d32_float, 4, 4, "depth", TextureUsage::sampled);
     GraphicsPipelineDesc desc;
     desc.vertex = shader(ShaderStage::vertex, depth_vertex);
-    desc.depth_stencil = {.format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::always};
+    desc.depth_stencil = {.format = Format::d32_float,
+                          .depth_test = true,
+                          .depth_write = true,
+                          .depth_compare = CompareOperation::always};
     const GraphicsPipeline prepass = ok(device().create_graphics_pipeline(desc));
     desc.fragment = shader(ShaderStage::fragment, R"(
         layout(set = 0, binding = 0) uniform sampler2D image;
@@ -139,7 +158,9 @@ TEST_P(Targets, DepthIsKeptBetweenPassesAndReadWhileTested) {
     list.set_push_constants(0.5f);
     list.draw({.vertex_count = 3});
     list.end_render_pass();
-    list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear}}, .depth_stencil = {.view = depth, .read_only = true}, .name = "shade"});
+    list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear}},
+                            .depth_stencil = {.view = depth, .read_only = true},
+                            .name = "shade"});
     list.set_pipeline(shade);
     list.set_bind_group(0, bound);
     list.set_push_constants(0.5f);
@@ -153,38 +174,55 @@ TEST_P(Targets, DepthIsKeptBetweenPassesAndReadWhileTested) {
 TEST_P(Targets, StencilOperations) {
     SKIP_WITHOUT(supports(Format::d32_float_s8_uint, FormatSupport::depth_target));
     const Texture picture = target(Format::r8_unorm, 2, 2);
-    const Texture depth = ok(device().create_texture({.format = Format::d32_float_s8_uint, .width = 2, .height = 2, .usage = TextureUsage::depth_target, .name = "stencil"}));
+    const Texture depth = ok(device().create_texture({.format = Format::d32_float_s8_uint,
+                                                      .width = 2,
+                                                      .height = 2,
+                                                      .usage = TextureUsage::depth_target,
+                                                      .name = "stencil"}));
     struct Case {
         StencilOperation operation;
         std::uint8_t before, reference, after;
     };
-    for (const Case& one : {Case{StencilOperation::keep, 7, 3, 7}, {StencilOperation::zero, 7, 3, 0}, {StencilOperation::replace, 7, 3, 3},
-                            {StencilOperation::increment_clamp, 255, 3, 255}, {StencilOperation::increment_clamp, 7, 3, 8},
-                            {StencilOperation::decrement_clamp, 0, 3, 0}, {StencilOperation::invert, 0x0f, 3, 0xf0},
-                            {StencilOperation::increment_wrap, 255, 3, 0}, {StencilOperation::decrement_wrap, 0, 3, 255}}) {
+    for (const Case& one : {Case{StencilOperation::keep, 7, 3, 7},
+                            {StencilOperation::zero, 7, 3, 0},
+                            {StencilOperation::replace, 7, 3, 3},
+                            {StencilOperation::increment_clamp, 255, 3, 255},
+                            {StencilOperation::increment_clamp, 7, 3, 8},
+                            {StencilOperation::decrement_clamp, 0, 3, 0},
+                            {StencilOperation::invert, 0x0f, 3, 0xf0},
+                            {StencilOperation::increment_wrap, 255, 3, 0},
+                            {StencilOperation::decrement_wrap, 0, 3, 255}}) {
         GraphicsPipelineDesc desc;
         desc.vertex = shader(ShaderStage::vertex, depth_vertex);
-        desc.depth_stencil = {.format = Format::d32_float_s8_uint, .stencil_test = true, .front = {.pass = one.operation}, .back = {.pass = one.operation}};
+        desc.depth_stencil = {.format = Format::d32_float_s8_uint,
+                              .stencil_test = true,
+                              .front = {.pass = one.operation},
+                              .back = {.pass = one.operation}};
         const GraphicsPipeline change = ok(device().create_graphics_pipeline(desc));
         desc.fragment = shader(ShaderStage::fragment, white);
         desc.color_targets = {{.format = Format::r8_unorm}};
         desc.depth_stencil.front = desc.depth_stencil.back = {.compare = CompareOperation::equal};
         const GraphicsPipeline show = ok(device().create_graphics_pipeline(desc));
         CommandList list = device().create_command_list("stencil");
-        list.begin_render_pass({.depth_stencil = {.view = depth, .depth_load = LoadOperation::clear, .stencil_load = LoadOperation::clear, .clear_stencil = one.before}});
+        list.begin_render_pass({.depth_stencil = {.view = depth,
+                                                  .depth_load = LoadOperation::clear,
+                                                  .stencil_load = LoadOperation::clear,
+                                                  .clear_stencil = one.before}});
         list.set_pipeline(change);
         list.set_push_constants(0.5f);
         list.set_stencil_reference(one.reference);
         list.draw({.vertex_count = 3});
         list.end_render_pass();
-        list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear}}, .depth_stencil = {.view = depth}});
+        list.begin_render_pass(
+            {.color = {{.view = picture, .load = LoadOperation::clear}}, .depth_stencil = {.view = depth}});
         list.set_pipeline(show);
         list.set_push_constants(0.5f);
         list.set_stencil_reference(one.after);
         list.draw({.vertex_count = 3});
         list.end_render_pass();
         run(std::move(list));
-        EXPECT_EQ(count_of(read<std::uint8_t>(picture), 255), 4u) << "operation " << static_cast<int>(one.operation) << " on " << int{one.before};
+        EXPECT_EQ(count_of(read<std::uint8_t>(picture), 255), 4u)
+            << "operation " << static_cast<int>(one.operation) << " on " << int{one.before};
     }
 }
 
@@ -209,7 +247,10 @@ TEST_P(Targets, ViewportDepthRange) {
     const Texture depth = target(Format::d32_float, 2, 2);
     GraphicsPipelineDesc desc;
     desc.vertex = shader(ShaderStage::vertex, depth_vertex);
-    desc.depth_stencil = {.format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::always};
+    desc.depth_stencil = {.format = Format::d32_float,
+                          .depth_test = true,
+                          .depth_write = true,
+                          .depth_compare = CompareOperation::always};
     const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc));
     CommandList list = device().create_command_list("range");
     list.begin_render_pass({.depth_stencil = {.view = depth, .depth_load = LoadOperation::clear}});
@@ -250,7 +291,9 @@ TEST_P(Targets, ClearsIgnoreScissorsAndMasks) {
     const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc));
     CommandList list = device().create_command_list("masks");
     for (int i = 0; i < 2; ++i) {
-        list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear, .clear = {.floating = {0.2f, 0.2f, 0.2f, 0.2f}}}}});
+        list.begin_render_pass(
+            {.color = {
+                 {.view = picture, .load = LoadOperation::clear, .clear = {.floating = {0.2f, 0.2f, 0.2f, 0.2f}}}}});
         list.set_pipeline(pipeline);
         list.set_scissor({0, 0, 1, 1});
         list.draw({.vertex_count = 3});
@@ -274,7 +317,8 @@ TEST_P(Targets, EarlyTestsKeepHiddenFragmentsFromWriting) {
         layout(set = 0, binding = 0) buffer Counter { uint count; };
         void main() { atomicAdd(count, 1u); }
     )");
-    desc.depth_stencil = {.format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::less};
+    desc.depth_stencil = {
+        .format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::less};
     const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc));
     const BindGroup bound = group(pipeline, {{.binding = 0, .buffer = counter}});
     CommandList list = device().create_command_list("early");
@@ -296,10 +340,15 @@ TEST_P(Targets, DepthClampKeepsWhatLiesBehind) {
         const Texture depth = target(Format::d32_float, 2, 2);
         GraphicsPipelineDesc desc;
         desc.vertex = shader(ShaderStage::vertex, depth_vertex);
-        desc.depth_stencil = {.format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::always, .depth_clamp = clamp};
+        desc.depth_stencil = {.format = Format::d32_float,
+                              .depth_test = true,
+                              .depth_write = true,
+                              .depth_compare = CompareOperation::always,
+                              .depth_clamp = clamp};
         const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc));
         CommandList list = device().create_command_list("clamp");
-        list.begin_render_pass({.depth_stencil = {.view = depth, .depth_load = LoadOperation::clear, .clear_depth = 0.25f}});
+        list.begin_render_pass(
+            {.depth_stencil = {.view = depth, .depth_load = LoadOperation::clear, .clear_depth = 0.25f}});
         list.set_pipeline(pipeline);
         list.set_push_constants(1.5f);
         list.draw({.vertex_count = 3});
@@ -319,7 +368,12 @@ TEST_P(Targets, DepthBiasMovesDepth) {
                 gl_Position = vec4(corner, 0.5 + 0.1 * corner.x, 1.0);
             }
         )");
-        desc.depth_stencil = {.format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::always, .depth_bias = bias, .depth_bias_slope = slope};
+        desc.depth_stencil = {.format = Format::d32_float,
+                              .depth_test = true,
+                              .depth_write = true,
+                              .depth_compare = CompareOperation::always,
+                              .depth_bias = bias,
+                              .depth_bias_slope = slope};
         const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc));
         CommandList list = device().create_command_list("bias");
         list.begin_render_pass({.depth_stencil = {.view = depth, .depth_load = LoadOperation::clear}});
@@ -342,7 +396,10 @@ TEST_P(Targets, AlphaCoversSamples) {
     const Texture samples = target(Format::rgba8_unorm, 4, 4, "samples", TextureUsage::none, 4);
     const Texture picture = target(Format::rgba8_unorm, 4, 4, "picture");
     for (const float alpha : {0.0f, 1.0f}) {
-        GraphicsPipelineDesc desc = fullscreen_desc("layout(location = 0) out vec4 color; void main() { color = vec4(1, 1, 1, " + std::to_string(alpha) + "); }", {{.format = Format::rgba8_unorm}});
+        GraphicsPipelineDesc desc =
+            fullscreen_desc("layout(location = 0) out vec4 color; void main() { color = vec4(1, 1, 1, " +
+                                std::to_string(alpha) + "); }",
+                            {{.format = Format::rgba8_unorm}});
         desc.samples = 4;
         desc.alpha_to_coverage = true;
         const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc));
@@ -361,7 +418,9 @@ TEST_P(Targets, WireframesLeaveTheInsideOpen) {
     SKIP_WITHOUT(capabilities().wireframe);
     const Texture picture = target(Format::r8_unorm, 16, 16);
     GraphicsPipelineDesc desc;
-    desc.vertex = shader(ShaderStage::vertex, "void main() { const vec2 c[3] = vec2[](vec2(-0.9, -0.9), vec2(0.9, -0.9), vec2(-0.9, 0.9)); gl_Position = vec4(c[gl_VertexIndex], 0, 1); }");
+    desc.vertex = shader(ShaderStage::vertex,
+                         "void main() { const vec2 c[3] = vec2[](vec2(-0.9, -0.9), vec2(0.9, -0.9), vec2(-0.9, 0.9)); "
+                         "gl_Position = vec4(c[gl_VertexIndex], 0, 1); }");
     desc.fragment = shader(ShaderStage::fragment, white);
     desc.fill = FillMode::line;
     desc.color_targets = {{.format = Format::r8_unorm}};
@@ -383,7 +442,10 @@ TEST_P(Queries, TimestampsRise) {
     SKIP_WITHOUT(capabilities().timestamps);
     const QueryPool pool = ok(device().create_query_pool({.type = QueryType::timestamp, .count = 4, .name = "times"}));
     const Texture picture = target(Format::rgba8_unorm, 256, 256);
-    const GraphicsPipeline pipeline = fullscreen("layout(location = 0) in vec2 uv; layout(location = 0) out vec4 color; void main() { float a = uv.x; for (int i = 0; i < 50; ++i) a = sin(a) + uv.y; color = vec4(a); }", Format::rgba8_unorm);
+    const GraphicsPipeline pipeline = fullscreen(
+        "layout(location = 0) in vec2 uv; layout(location = 0) out vec4 color; void main() { float a = uv.x; for (int "
+        "i = 0; i < 50; ++i) a = sin(a) + uv.y; color = vec4(a); }",
+        Format::rgba8_unorm);
     for (int round = 0; round < 2; ++round) {  // The second round overwrites the first.
         CommandList list = device().create_command_list("times");
         list.write_timestamp(pool, 1);

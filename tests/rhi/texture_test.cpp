@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Textures of every dimension and format: content, copies, clears, mips.
-#include "tests/rhi/backend_test.h"
-
 #include <cmath>
 #include <random>
+
+#include "tests/rhi/backend_test.h"
 
 namespace nacre::test {
 namespace {
@@ -36,7 +36,8 @@ TEST_P(Textures, EveryMipAndLayerOfEachDimension) {
         {{.dimension = TextureDimension::cube, .width = 8, .height = 8, .layers = 6, .mips = 4, .name = "cube"}},
     };
     if (capabilities().cube_arrays)
-        cases.push_back({{.dimension = TextureDimension::cube, .width = 4, .height = 4, .layers = 12, .mips = 3, .name = "cubes"}});
+        cases.push_back(
+            {{.dimension = TextureDimension::cube, .width = 4, .height = 4, .layers = 12, .mips = 3, .name = "cubes"}});
     for (Case& one : cases) {
         one.desc.format = Format::rgba8_unorm;
         one.desc.usage = TextureUsage::sampled | all_copies;
@@ -58,7 +59,10 @@ TEST_P(Textures, ContentOfEveryFormat) {
     for (std::uint32_t i = 1; i < format_count; ++i) {
         const auto format = static_cast<Format>(i);
         if (!supports(format, FormatSupport::sampled) || info(format).has_stencil) continue;
-        const TextureDesc desc{.format = format, .width = 20, .height = 12, .usage = TextureUsage::sampled | all_copies,
+        const TextureDesc desc{.format = format,
+                               .width = 20,
+                               .height = 12,
+                               .usage = TextureUsage::sampled | all_copies,
                                .name = std::string(info(format).name)};
         const Texture texture = ok(device().create_texture(desc));
         std::vector<std::byte> content = bytes_for(mip_bytes(desc, 0), i);
@@ -80,7 +84,12 @@ TEST_P(Textures, ContentOfEveryFormat) {
 }
 
 TEST_P(Textures, CopyBetweenBufferAndTextureWithRows) {
-    const TextureDesc desc{.format = Format::r32_uint, .width = 8, .height = 6, .layers = 3, .usage = TextureUsage::sampled | all_copies, .name = "t"};
+    const TextureDesc desc{.format = Format::r32_uint,
+                           .width = 8,
+                           .height = 6,
+                           .layers = 3,
+                           .usage = TextureUsage::sampled | all_copies,
+                           .name = "t"};
     const Texture texture = ok(device().create_texture(desc));
     std::vector<std::uint32_t> values(64);
     for (std::uint32_t i = 0; i < values.size(); ++i) values[i] = 1000 + i;
@@ -89,16 +98,20 @@ TEST_P(Textures, CopyBetweenBufferAndTextureWithRows) {
     CommandList list = device().create_command_list("rows");
     list.clear_texture(texture, {.uint = {7, 0, 0, 0}});
     // 3x2 texels to (2, 1) of layer 1; rows of 5 texels in the buffer, from the fourth value.
-    list.copy_buffer_to_texture(from, texture, {.buffer_offset = 16, .bytes_per_row = 20, .layer = 1, .offset = {2, 1, 0}, .extent = {3, 2, 1}});
+    list.copy_buffer_to_texture(
+        from, texture,
+        {.buffer_offset = 16, .bytes_per_row = 20, .layer = 1, .offset = {2, 1, 0}, .extent = {3, 2, 1}});
     list.fill_buffer(to, 0);
-    list.copy_texture_to_buffer(texture, to, {.buffer_offset = 8, .bytes_per_row = 32, .layer = 1, .offset = {1, 1, 0}, .extent = {4, 2, 1}});
+    list.copy_texture_to_buffer(
+        texture, to, {.buffer_offset = 8, .bytes_per_row = 32, .layer = 1, .offset = {1, 1, 0}, .extent = {4, 2, 1}});
     run(std::move(list));
     for (std::uint32_t layer = 0; layer < 3; ++layer) {
         const auto texels = read<std::uint32_t>(texture, 0, layer);
         for (std::uint32_t y = 0; y < 6; ++y)
             for (std::uint32_t x = 0; x < 8; ++x) {
                 const bool inside = layer == 1 && x >= 2 && x < 5 && y >= 1 && y < 3;
-                EXPECT_EQ(texels[y * 8 + x], inside ? 1004 + (y - 1) * 5 + (x - 2) : 7u) << layer << ": " << x << ", " << y;
+                EXPECT_EQ(texels[y * 8 + x], inside ? 1004 + (y - 1) * 5 + (x - 2) : 7u)
+                    << layer << ": " << x << ", " << y;
             }
     }
     const auto back = read<std::uint32_t>(to);
@@ -107,7 +120,13 @@ TEST_P(Textures, CopyBetweenBufferAndTextureWithRows) {
 }
 
 TEST_P(Textures, CopyBetweenTextures) {
-    TextureDesc desc{.format = Format::rgba8_unorm, .width = 8, .height = 8, .layers = 4, .mips = 3, .usage = TextureUsage::sampled | all_copies, .name = "from"};
+    TextureDesc desc{.format = Format::rgba8_unorm,
+                     .width = 8,
+                     .height = 8,
+                     .layers = 4,
+                     .mips = 3,
+                     .usage = TextureUsage::sampled | all_copies,
+                     .name = "from"};
     const Texture from = ok(device().create_texture(desc));
     desc.name = "to";
     const Texture to = ok(device().create_texture(desc));
@@ -118,8 +137,14 @@ TEST_P(Textures, CopyBetweenTextures) {
         ok(device().write_texture(to, std::vector<std::byte>(64, std::byte{9}), 1, layer));
     }
     CommandList list = device().create_command_list("copy");
-    list.copy_texture(from, to, {.source_mip = 1, .source_layer = 1, .destination_mip = 1, .destination_layer = 0, .layer_count = 2});
-    list.copy_texture(from, to, {.source_layer = 3, .source_offset = {1, 2, 0}, .destination_layer = 3, .destination_offset = {4, 5, 0}, .extent = {3, 2, 1}});
+    list.copy_texture(
+        from, to, {.source_mip = 1, .source_layer = 1, .destination_mip = 1, .destination_layer = 0, .layer_count = 2});
+    list.copy_texture(from, to,
+                      {.source_layer = 3,
+                       .source_offset = {1, 2, 0},
+                       .destination_layer = 3,
+                       .destination_offset = {4, 5, 0},
+                       .extent = {3, 2, 1}});
     list.copy_texture(from, from, {.source_mip = 1, .source_layer = 0, .destination_mip = 1, .destination_layer = 3});
     run(std::move(list));
     EXPECT_EQ(ok(device().read_texture(to, 1, 0)), bytes_for(64, 11));
@@ -136,7 +161,13 @@ TEST_P(Textures, CopyBetweenTextures) {
 }
 
 TEST_P(Textures, CopyPartsOfVolumes) {
-    const TextureDesc desc{.dimension = TextureDimension::d3, .format = Format::r32_uint, .width = 4, .height = 4, .depth = 4, .usage = TextureUsage::sampled | all_copies, .name = "volume"};
+    const TextureDesc desc{.dimension = TextureDimension::d3,
+                           .format = Format::r32_uint,
+                           .width = 4,
+                           .height = 4,
+                           .depth = 4,
+                           .usage = TextureUsage::sampled | all_copies,
+                           .name = "volume"};
     const Texture volume = ok(device().create_texture(desc));
     ok(device().write_texture(volume, std::vector<std::byte>(256)));
     const std::array<std::uint32_t, 8> values{1, 2, 3, 4, 5, 6, 7, 8};
@@ -157,7 +188,11 @@ TEST_P(Textures, CopyPartsOfVolumes) {
 TEST_P(Textures, ClearOfFloatIntegerAndDepth) {
     CommandList list = device().create_command_list("clears");
     const auto make = [&](Format format, TextureUsage more = TextureUsage::none) {
-        return ok(device().create_texture({.format = format, .width = 4, .height = 4, .layers = 2, .mips = 2,
+        return ok(device().create_texture({.format = format,
+                                           .width = 4,
+                                           .height = 4,
+                                           .layers = 2,
+                                           .mips = 2,
                                            .usage = TextureUsage::sampled | all_copies | more,
                                            .name = std::string(info(format).name)}));
     };
@@ -186,11 +221,18 @@ TEST_P(Textures, ClearOfFloatIntegerAndDepth) {
 }
 
 TEST_P(Textures, GeneratedMipsAverageFourTexels) {
-    const TextureDesc desc{.format = Format::rgba8_unorm, .width = 8, .height = 4, .layers = 2, .mips = 4, .usage = TextureUsage::sampled | all_copies, .name = "mips"};
+    const TextureDesc desc{.format = Format::rgba8_unorm,
+                           .width = 8,
+                           .height = 4,
+                           .layers = 2,
+                           .mips = 4,
+                           .usage = TextureUsage::sampled | all_copies,
+                           .name = "mips"};
     const Texture texture = ok(device().create_texture(desc));
     for (std::uint32_t layer = 0; layer < 2; ++layer) {
         std::vector<std::uint8_t> texels(8 * 4 * 4);
-        for (std::size_t i = 0; i < texels.size(); ++i) texels[i] = static_cast<std::uint8_t>((i * 37 + layer * 90) % 251);
+        for (std::size_t i = 0; i < texels.size(); ++i)
+            texels[i] = static_cast<std::uint8_t>((i * 37 + layer * 90) % 251);
         ok(device().write_texture(texture, std::as_bytes(std::span(texels)), 0, layer));
     }
     CommandList list = device().create_command_list("mips");
@@ -209,14 +251,20 @@ TEST_P(Textures, GeneratedMipsAverageFourTexels) {
                         for (std::uint32_t dy = 0; dy < 2; ++dy)
                             for (std::uint32_t dx = 0; dx < 2; ++dx)
                                 sum += source[((2 * y + dy) * above.width + 2 * x + dx) * 4 + c];
-                        EXPECT_NEAR(result[(y * size.width + x) * 4 + c], sum / 4, 1.0) << "mip " << mip << " layer " << layer;
+                        EXPECT_NEAR(result[(y * size.width + x) * 4 + c], sum / 4, 1.0)
+                            << "mip " << mip << " layer " << layer;
                     }
         }
 }
 
 TEST_P(Textures, GeneratedMipsAverageSrgbInLinearLight) {
     SKIP_WITHOUT(supports(Format::rgba8_srgb, FormatSupport::color_target | FormatSupport::filtered));
-    const TextureDesc desc{.format = Format::rgba8_srgb, .width = 2, .height = 2, .mips = 2, .usage = TextureUsage::sampled | all_copies, .name = "srgb"};
+    const TextureDesc desc{.format = Format::rgba8_srgb,
+                           .width = 2,
+                           .height = 2,
+                           .mips = 2,
+                           .usage = TextureUsage::sampled | all_copies,
+                           .name = "srgb"};
     const Texture texture = ok(device().create_texture(desc));
     const std::array<std::uint32_t, 4> texels{0xff000000u, 0xffffffffu, 0xffffffffu, 0xff000000u};
     ok(device().write_texture(texture, std::as_bytes(std::span(texels))));
@@ -231,17 +279,22 @@ TEST_P(Textures, GeneratedMipsAverageSrgbInLinearLight) {
 
 TEST_P(Textures, BlockCompressedTexelsAreDecoded) {
     SKIP_WITHOUT(capabilities().block_compression && supports(Format::bc1_rgba_unorm, FormatSupport::sampled));
-    // A BC1 block: color 0 is pure red, color 1 pure blue (565), all texels of row 0 color 0, of row 1 color 1, of row 2
-    // two thirds red, of row 3 one third red.
+    // A BC1 block: color 0 is pure red, color 1 pure blue (565), all texels of row 0 color 0, of row 1 color 1, of row
+    // 2 two thirds red, of row 3 one third red.
     const std::array<std::uint8_t, 8> block{0x00, 0xf8, 0x1f, 0x00, 0x00, 0x55, 0xaa, 0xff};
-    const Texture texture = ok(device().create_texture({.format = Format::bc1_rgba_unorm, .width = 4, .height = 4, .usage = TextureUsage::sampled | all_copies, .name = "bc1"}));
+    const Texture texture = ok(device().create_texture({.format = Format::bc1_rgba_unorm,
+                                                        .width = 4,
+                                                        .height = 4,
+                                                        .usage = TextureUsage::sampled | all_copies,
+                                                        .name = "bc1"}));
     ok(device().write_texture(texture, std::as_bytes(std::span(block))));
     const auto values = evaluate<float>(R"(
         layout(local_size_x = 4, local_size_y = 4) in;
         layout(set = 0, binding = 0) buffer Result { vec4 result[16]; };
         layout(set = 0, binding = 1) uniform sampler2D image;
         void main() { result[gl_LocalInvocationIndex] = texelFetch(image, ivec2(gl_LocalInvocationID.xy), 0); }
-    )", 64, {{.binding = 1, .texture = texture, .sampler = nearest()}});
+    )",
+                                        64, {{.binding = 1, .texture = texture, .sampler = nearest()}});
     const std::array<float, 4> red{1.0f, 0.0f, 2.0f / 3.0f, 1.0f / 3.0f};
     for (std::size_t y = 0; y < 4; ++y)
         for (std::size_t x = 0; x < 4; ++x) {
@@ -259,7 +312,8 @@ TEST_P(Textures, IntegerTexelsAreExactInShaders) {
         layout(set = 0, binding = 0) buffer Result { uint result[4]; };
         layout(set = 0, binding = 1) uniform usampler2D image;
         void main() { result[gl_LocalInvocationIndex] = texelFetch(image, ivec2(gl_LocalInvocationID.xy), 0).r; }
-    )", 4, {{.binding = 1, .texture = texture, .sampler = nearest()}});
+    )",
+                                                4, {{.binding = 1, .texture = texture, .sampler = nearest()}});
     EXPECT_EQ(result, std::vector<std::uint32_t>(values.begin(), values.end()));
 }
 
@@ -270,43 +324,64 @@ TEST_P(Textures, StorageImagesOfEveryFormat) {
         const char* qualifier;
         const char* type;
     };
-    for (const Case& one : {Case{Format::rgba32_float, "rgba32f", "image2D"}, {Format::rgba16_float, "rgba16f", "image2D"},
-                            {Format::r32_float, "r32f", "image2D"}, {Format::rgba8_unorm, "rgba8", "image2D"},
-                            {Format::rgba8_snorm, "rgba8_snorm", "image2D"}, {Format::rgba32_uint, "rgba32ui", "uimage2D"},
-                            {Format::rgba16_uint, "rgba16ui", "uimage2D"}, {Format::rgba8_uint, "rgba8ui", "uimage2D"},
-                            {Format::r32_uint, "r32ui", "uimage2D"}, {Format::rgba32_sint, "rgba32i", "iimage2D"},
-                            {Format::rgba16_sint, "rgba16i", "iimage2D"}, {Format::rgba8_sint, "rgba8i", "iimage2D"},
+    for (const Case& one : {Case{Format::rgba32_float, "rgba32f", "image2D"},
+                            {Format::rgba16_float, "rgba16f", "image2D"},
+                            {Format::r32_float, "r32f", "image2D"},
+                            {Format::rgba8_unorm, "rgba8", "image2D"},
+                            {Format::rgba8_snorm, "rgba8_snorm", "image2D"},
+                            {Format::rgba32_uint, "rgba32ui", "uimage2D"},
+                            {Format::rgba16_uint, "rgba16ui", "uimage2D"},
+                            {Format::rgba8_uint, "rgba8ui", "uimage2D"},
+                            {Format::r32_uint, "r32ui", "uimage2D"},
+                            {Format::rgba32_sint, "rgba32i", "iimage2D"},
+                            {Format::rgba16_sint, "rgba16i", "iimage2D"},
+                            {Format::rgba8_sint, "rgba8i", "iimage2D"},
                             {Format::r32_sint, "r32i", "iimage2D"}}) {
         ASSERT_TRUE(supports(one.format, FormatSupport::storage_image)) << info(one.format).name;
-        const Texture image = ok(device().create_texture({.format = one.format, .width = 4, .height = 4,
-                                                          .usage = TextureUsage::storage | all_copies, .name = one.qualifier}));
+        const Texture image = ok(device().create_texture({.format = one.format,
+                                                          .width = 4,
+                                                          .height = 4,
+                                                          .usage = TextureUsage::storage | all_copies,
+                                                          .name = one.qualifier}));
         const std::string prefix = one.type[0] == 'i' && one.type[1] == 'm' ? "" : std::string(1, one.type[0]);
         // Writes 1 in red (or the index where that fits), and reads it back into the buffer.
         const auto result = evaluate<std::uint32_t>(
             "layout(local_size_x = 4, local_size_y = 4) in;\n"
             "layout(set = 0, binding = 0) buffer Result { uint result[16]; };\n"
-            "layout(set = 0, binding = 1, " + std::string(one.qualifier) + ") uniform writeonly " + one.type + " image;\n"
-            "void main() {\n"
-            "    imageStore(image, ivec2(gl_LocalInvocationID.xy), " + prefix + "vec4(gl_LocalInvocationID.x == 2u ? 1 : 0));\n"
-            "    result[gl_LocalInvocationIndex] = gl_LocalInvocationIndex;\n"
-            "}\n",
+            "layout(set = 0, binding = 1, " +
+                std::string(one.qualifier) + ") uniform writeonly " + one.type +
+                " image;\n"
+                "void main() {\n"
+                "    imageStore(image, ivec2(gl_LocalInvocationID.xy), " +
+                prefix +
+                "vec4(gl_LocalInvocationID.x == 2u ? 1 : 0));\n"
+                "    result[gl_LocalInvocationIndex] = gl_LocalInvocationIndex;\n"
+                "}\n",
             16, {{.binding = 1, .texture = image}});
         EXPECT_EQ(result[15], 15u);
         const auto read_back = evaluate<float>(
             "layout(local_size_x = 4, local_size_y = 4) in;\n"
             "layout(set = 0, binding = 0) buffer Result { float result[16]; };\n"
-            "layout(set = 0, binding = 1, " + std::string(one.qualifier) + ") uniform readonly " + one.type + " image;\n"
-            "void main() { result[gl_LocalInvocationIndex] = float(imageLoad(image, ivec2(gl_LocalInvocationID.xy)).r); }\n",
+            "layout(set = 0, binding = 1, " +
+                std::string(one.qualifier) + ") uniform readonly " + one.type +
+                " image;\n"
+                "void main() { result[gl_LocalInvocationIndex] = float(imageLoad(image, "
+                "ivec2(gl_LocalInvocationID.xy)).r); }\n",
             16, {{.binding = 1, .texture = image}});
-        for (std::size_t i = 0; i < 16; ++i) EXPECT_EQ(read_back[i], i % 4 == 2 ? 1.0f : 0.0f) << one.qualifier << " " << i;
+        for (std::size_t i = 0; i < 16; ++i)
+            EXPECT_EQ(read_back[i], i % 4 == 2 ? 1.0f : 0.0f) << one.qualifier << " " << i;
         ++formats;
     }
     EXPECT_EQ(formats, 13);
 }
 
 TEST_P(Textures, LayersOfStorageImages) {
-    const Texture image = ok(device().create_texture({.format = Format::r32_uint, .width = 4, .height = 4, .layers = 3,
-                                                      .usage = TextureUsage::storage | all_copies, .name = "layers"}));
+    const Texture image = ok(device().create_texture({.format = Format::r32_uint,
+                                                      .width = 4,
+                                                      .height = 4,
+                                                      .layers = 3,
+                                                      .usage = TextureUsage::storage | all_copies,
+                                                      .name = "layers"}));
     const ComputePipeline pipeline = compute(R"(
         layout(local_size_x = 4, local_size_y = 4) in;
         layout(set = 0, binding = 0, r32ui) uniform writeonly uimage2DArray image;
@@ -323,8 +398,11 @@ TEST_P(Textures, LayersOfStorageImages) {
 
 TEST_P(Textures, ImageAtomicsCount) {
     SKIP_WITHOUT(supports(Format::r32_uint, FormatSupport::storage_atomic));
-    const Texture image = ok(device().create_texture({.format = Format::r32_uint, .width = 2, .height = 1,
-                                                      .usage = TextureUsage::storage | all_copies, .name = "counter"}));
+    const Texture image = ok(device().create_texture({.format = Format::r32_uint,
+                                                      .width = 2,
+                                                      .height = 1,
+                                                      .usage = TextureUsage::storage | all_copies,
+                                                      .name = "counter"}));
     CommandList list = device().create_command_list("clear");
     list.clear_texture(image, {.uint = {5, 0, 0, 0}});
     run(std::move(list));
@@ -332,119 +410,9 @@ TEST_P(Textures, ImageAtomicsCount) {
         layout(local_size_x = 64) in;
         layout(set = 0, binding = 0, r32ui) uniform uimage2D image;
         void main() { imageAtomicAdd(image, ivec2(gl_LocalInvocationID.x % 2u, 0), 3u); }
-    )"), {{.binding = 0, .texture = image}}, {4, 1, 1});
+    )"),
+             {{.binding = 0, .texture = image}}, {4, 1, 1});
     EXPECT_EQ(read<std::uint32_t>(image), (std::vector<std::uint32_t>{5 + 128 * 3, 5 + 128 * 3}));
-}
-
-BACKEND_SUITE(Views);
-
-TEST_P(Views, OneMipAndOneLayer) {
-    SKIP_WITHOUT(capabilities().texture_views);
-    TextureDesc desc{.format = Format::r32_uint, .width = 4, .height = 4, .layers = 3, .mips = 3, .usage = TextureUsage::sampled | all_copies, .name = "t"};
-    const Texture texture = ok(device().create_texture(desc));
-    for (std::uint32_t layer = 0; layer < 3; ++layer)
-        for (std::uint32_t mip = 0; mip < 3; ++mip) {
-            const std::vector<std::uint32_t> texels(mip_bytes(desc, mip) / 4, layer * 10 + mip);
-            ok(device().write_texture(texture, std::as_bytes(std::span(texels)), mip, layer));
-        }
-    TextureView view = TextureView::subresource(texture, 1, 2);
-    const auto one = evaluate<std::uint32_t>(R"(
-        layout(local_size_x = 1) in;
-        layout(set = 0, binding = 0) buffer Result { uint result[2]; };
-        layout(set = 0, binding = 1) uniform usampler2D image;
-        void main() {
-            result[0] = texelFetch(image, ivec2(0), 0).r;
-            result[1] = uint(textureSize(image, 0).x);
-        }
-    )", 2, {{.binding = 1, .texture = view, .sampler = nearest()}});
-    EXPECT_EQ(one[0], 21u);
-    EXPECT_EQ(one[1], 2u);
-    TextureView layers(texture);
-    layers.base_layer = 1;
-    layers.base_mip = 2;
-    const auto array = evaluate<std::uint32_t>(R"(
-        layout(local_size_x = 1) in;
-        layout(set = 0, binding = 0) buffer Result { uint result[3]; };
-        layout(set = 0, binding = 1) uniform usampler2DArray image;
-        void main() {
-            result[0] = texelFetch(image, ivec3(0, 0, 0), 0).r;
-            result[1] = texelFetch(image, ivec3(0, 0, 1), 0).r;
-            result[2] = uint(textureSize(image, 0).z);
-        }
-    )", 3, {{.binding = 1, .texture = layers, .sampler = nearest()}});
-    EXPECT_EQ(array, (std::vector<std::uint32_t>{12, 22, 2}));
-}
-
-TEST_P(Views, FacesOfACube) {
-    const TextureDesc desc{.dimension = TextureDimension::cube, .format = Format::rgba8_unorm, .width = 2, .height = 2, .layers = 6, .usage = TextureUsage::sampled | all_copies, .name = "cube"};
-    const Texture texture = ok(device().create_texture(desc));
-    for (std::uint32_t layer = 0; layer < 6; ++layer) {
-        const std::vector<std::uint32_t> texels(4, 0xff000000u | (layer * 40));
-        ok(device().write_texture(texture, std::as_bytes(std::span(texels)), 0, layer));
-    }
-    const auto faces = evaluate<float>(R"(
-        layout(local_size_x = 1) in;
-        layout(set = 0, binding = 0) buffer Result { float result[6]; };
-        layout(set = 0, binding = 1) uniform samplerCube image;
-        void main() {
-            const vec3 axes[6] = vec3[](vec3(1, 0, 0), vec3(-1, 0, 0), vec3(0, 1, 0), vec3(0, -1, 0), vec3(0, 0, 1), vec3(0, 0, -1));
-            for (int i = 0; i < 6; ++i) result[i] = textureLod(image, axes[i], 0.0).r * 255.0;
-        }
-    )", 6, {{.binding = 1, .texture = texture, .sampler = nearest()}});
-    for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(faces[i], static_cast<float>(i) * 40.0f, 0.5f) << i;
-    if (!capabilities().texture_views) return;
-    // The same faces as layers of a 2D array.
-    TextureView array(texture);
-    array.dimension = ViewDimension::d2_array;
-    const auto layers = evaluate<float>(R"(
-        layout(local_size_x = 1) in;
-        layout(set = 0, binding = 0) buffer Result { float result[6]; };
-        layout(set = 0, binding = 1) uniform sampler2DArray image;
-        void main() { for (int i = 0; i < 6; ++i) result[i] = texelFetch(image, ivec3(0, 0, i), 0).r * 255.0; }
-    )", 6, {{.binding = 1, .texture = array, .sampler = nearest()}});
-    EXPECT_EQ(layers, faces);
-}
-
-TEST_P(Views, OtherFormatOfTheSameSize) {
-    SKIP_WITHOUT(capabilities().texture_view_formats);
-    const std::array<std::uint32_t, 1> texel{0xff8000bcu};
-    const Texture texture = texture_of<std::uint32_t>(Format::rgba8_unorm, 1, 1, texel);
-    TextureView srgb(texture);
-    srgb.format = Format::rgba8_srgb;
-    const auto values = evaluate<float>(R"(
-        layout(local_size_x = 1) in;
-        layout(set = 0, binding = 0) buffer Result { vec4 result[2]; };
-        layout(set = 0, binding = 1) uniform sampler2D as_unorm;
-        layout(set = 0, binding = 2) uniform sampler2D as_srgb;
-        void main() { result[0] = texelFetch(as_unorm, ivec2(0), 0); result[1] = texelFetch(as_srgb, ivec2(0), 0); }
-    )", 8, {{.binding = 1, .texture = texture, .sampler = nearest()}, {.binding = 2, .texture = srgb, .sampler = nearest()}});
-    EXPECT_NEAR(values[0], 188.0f / 255.0f, 1e-5f);
-    EXPECT_NEAR(values[4], 0.5029f, 2e-3f);
-    EXPECT_NEAR(values[2], 128.0f / 255.0f, 1e-5f);
-    EXPECT_NEAR(values[6], 0.2159f, 2e-3f);
-}
-
-TEST_P(Views, MipsAndLayersAsTargets) {
-    const TextureDesc desc{.format = Format::rgba8_unorm, .width = 8, .height = 8, .layers = 2, .mips = 3, .usage = TextureUsage::color_target | all_copies, .name = "targets"};
-    const Texture texture = ok(device().create_texture(desc));
-    const GraphicsPipeline pipeline = fullscreen("layout(location = 0) out vec4 color; void main() { color = vec4(gl_FragCoord.xy / 255.0, 1, 1); }", Format::rgba8_unorm);
-    CommandList list = device().create_command_list("targets");
-    list.clear_texture(texture, {});
-    list.begin_render_pass({.color = {{.view = TextureView::subresource(texture, 1, 1)}}, .name = "mip 1 of layer 1"});
-    list.set_pipeline(pipeline);
-    list.draw({.vertex_count = 3});
-    list.end_render_pass();
-    run(std::move(list));
-    for (std::uint32_t layer = 0; layer < 2; ++layer)
-        for (std::uint32_t mip = 0; mip < 3; ++mip) {
-            const auto texels = read<std::array<std::uint8_t, 4>>(texture, mip, layer);
-            for (const auto& texel : texels) EXPECT_EQ(texel[2], mip == 1 && layer == 1 ? 255 : 0) << mip << ", " << layer;
-        }
-    const auto drawn = read<std::array<std::uint8_t, 4>>(texture, 1, 1);
-    EXPECT_LE(drawn[15][0] - 3, 1);
-    EXPECT_LE(drawn[15][1] - 3, 1);
-    EXPECT_LE(drawn[3][0] - 3, 1);
-    EXPECT_LE(drawn[3][1], 1);
 }
 
 }  // namespace

@@ -10,7 +10,8 @@
 
 namespace nacre::test {
 
-/// A device over the null backend with makers of things that are right, so that a test changes the one thing that is wrong.
+/// A device over the null backend with makers of things that are right, so that a test changes the one thing that is
+/// wrong.
 class Bench {
   public:
     explicit Bench(rhi::DeviceDesc desc = {}, rhi::Capabilities capabilities = full_capabilities())
@@ -73,7 +74,8 @@ class Bench {
         return *device().create_bind_group(
             {.layout = *device().bind_group_layout(pipeline, 0), .entries = std::move(entries), .name = "the group"});
     }
-    rhi::BindGroupLayout layout(rhi::BindingType type, rhi::ShaderStage stages = rhi::ShaderStage::compute, std::uint32_t count = 1) {
+    rhi::BindGroupLayout layout(rhi::BindingType type, rhi::ShaderStage stages = rhi::ShaderStage::compute,
+                                std::uint32_t count = 1) {
         return *device().create_bind_group_layout({.bindings = {{0, type, count, stages}}, .name = "the layout"});
     }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Vertex input, indices, instances, topologies and indirect draws.
-#include "tests/rhi/backend_test.h"
-
 #include <cmath>
+
+#include "tests/rhi/backend_test.h"
 
 namespace nacre::test {
 namespace {
@@ -46,7 +46,9 @@ class Vertices : public BackendTest {
     std::vector<std::array<std::uint32_t, 4>> draw(const GraphicsPipelineDesc& wanted, Record&& record) {
         const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(wanted));
         CommandList list = device().create_command_list("vertices");
-        list.begin_render_pass({.color = {{.view = result_, .load = LoadOperation::clear, .clear = {.uint = {99, 99, 99, 99}}}}, .name = "vertices"});
+        list.begin_render_pass(
+            {.color = {{.view = result_, .load = LoadOperation::clear, .clear = {.uint = {99, 99, 99, 99}}}},
+             .name = "vertices"});
         list.set_pipeline(pipeline);
         record(list);
         list.end_render_pass();
@@ -108,15 +110,21 @@ TEST_P(Vertices, AttributeFormats) {
 TEST_P(Vertices, IntegerAttributes) {
     const std::array<std::uint8_t, 16> bytes{1, 0, 0, 0x80, 0xfe, 0xff, 0xff, 0xff, 7, 0, 200, 0, 0x85, 0xff, 0, 0};
     const Buffer vertices = buffer_of<std::uint8_t>(bytes, BufferUsage::vertex);
-    GraphicsPipelineDesc wanted = desc("layout(location = 0) in uint a; layout(location = 1) in int b; layout(location = 2) in uvec2 c; layout(location = 4) in ivec2 d;",
-                                       "uvec4(a, uint(b), c.x * 1000u + c.y, uint(d.x))");
+    GraphicsPipelineDesc wanted = desc(
+        "layout(location = 0) in uint a; layout(location = 1) in int b; layout(location = 2) in uvec2 c; "
+        "layout(location = 4) in ivec2 d;",
+        "uvec4(a, uint(b), c.x * 1000u + c.y, uint(d.x))");
     wanted.vertex_buffers = {{.stride = 16}};
-    wanted.vertex_attributes = {{0, 0, 0, Format::r32_uint}, {1, 0, 4, Format::r32_sint}, {2, 0, 8, Format::rg16_uint}, {4, 0, 12, Format::rg8_sint}};
+    wanted.vertex_attributes = {{0, 0, 0, Format::r32_uint},
+                                {1, 0, 4, Format::r32_sint},
+                                {2, 0, 8, Format::rg16_uint},
+                                {4, 0, 12, Format::rg8_sint}};
     const auto texels = draw(wanted, [&](CommandList& list) {
         list.set_vertex_buffer(0, vertices);
         list.draw({.vertex_count = 1});
     });
-    EXPECT_EQ(texels[0], (std::array<std::uint32_t, 4>{0x80000001u, 0xfffffffeu, 7200u, static_cast<std::uint32_t>(-123)}));
+    EXPECT_EQ(texels[0],
+              (std::array<std::uint32_t, 4>{0x80000001u, 0xfffffffeu, 7200u, static_cast<std::uint32_t>(-123)}));
 }
 
 TEST_P(Vertices, BuffersOffsetsAndInstances) {
@@ -124,7 +132,8 @@ TEST_P(Vertices, BuffersOffsetsAndInstances) {
     for (std::size_t i = 0; i < 32; ++i) positions[i] = static_cast<float>(i), colors[i] = static_cast<float>(100 + i);
     const Buffer first = buffer_of<float>(positions, BufferUsage::vertex);
     const Buffer second = buffer_of<float>(colors, BufferUsage::vertex);
-    GraphicsPipelineDesc wanted = desc("layout(location = 0) in float a; layout(location = 1) in float b;", "uvec4(uint(a), uint(b), gl_VertexIndex, gl_InstanceIndex)");
+    GraphicsPipelineDesc wanted = desc("layout(location = 0) in float a; layout(location = 1) in float b;",
+                                       "uvec4(uint(a), uint(b), gl_VertexIndex, gl_InstanceIndex)");
     wanted.vertex_buffers = {{.stride = 8}, {.stride = 4, .per_instance = true}};
     wanted.vertex_attributes = {{0, 0, 4, Format::r32_float}, {1, 1, 0, Format::r32_float}};
     const auto texels = draw(wanted, [&](CommandList& list) {
@@ -166,15 +175,15 @@ TEST_P(Vertices, IndicesOfBothSizesWithOffsets) {
     const std::array<std::uint16_t, 6> small{0, 0, 5, 1, 3, 0};
     const std::array<std::uint32_t, 6> large{0, 0, 5, 1, 3, 0};
     for (const bool wide : {false, true}) {
-        const Buffer indices = wide ? buffer_of<std::uint32_t>(large, BufferUsage::index) : buffer_of<std::uint16_t>(small, BufferUsage::index);
+        const Buffer indices = wide ? buffer_of<std::uint32_t>(large, BufferUsage::index)
+                                    : buffer_of<std::uint16_t>(small, BufferUsage::index);
         const auto texels = draw(wanted, [&](CommandList& list) {
             list.set_vertex_buffer(0, vertices);
             list.set_index_buffer(indices, wide ? IndexType::uint32 : IndexType::uint16, wide ? 4 : 2);
             list.draw_indexed({.index_count = 3, .first_index = 1, .vertex_offset = 2});
         });
         // The indices 5, 1, 3, each 2 further.
-        for (std::uint32_t i = 0; i < 8; ++i)
-            EXPECT_EQ(texels[i][0], i == 7 || i == 3 || i == 5 ? 50 + i : 99u) << i;
+        for (std::uint32_t i = 0; i < 8; ++i) EXPECT_EQ(texels[i][0], i == 7 || i == 3 || i == 5 ? 50 + i : 99u) << i;
         EXPECT_EQ(texels[7][1], 7u);
     }
 }
@@ -190,7 +199,8 @@ TEST_P(Vertices, IndirectDraws) {
     const std::array<std::uint32_t, 8> zeros{};
     std::vector<std::uint32_t> words(zeros.begin(), zeros.begin() + 2);
     for (const DrawArguments& arguments : direct) {
-        words.insert(words.end(), {arguments.vertex_count, arguments.instance_count, arguments.first_vertex, arguments.first_instance});
+        words.insert(words.end(), {arguments.vertex_count, arguments.instance_count, arguments.first_vertex,
+                                   arguments.first_instance});
         words.push_back(0);  // The stride is larger than the arguments.
     }
     const Buffer arguments = buffer_of<std::uint32_t>(words, BufferUsage::indirect);
@@ -201,7 +211,8 @@ TEST_P(Vertices, IndirectDraws) {
     for (std::uint32_t i = 0; i < 8; ++i) EXPECT_EQ(texels[i][0], i == 1 || i == 2 || i == 6 ? i : 99u) << i;
     for (std::uint32_t i = 0; i < 8; ++i) EXPECT_EQ(texels[8 + i][0], i == 6 ? i : 99u) << i;
 
-    const std::array<DrawIndexedArguments, 2> indexed{DrawIndexedArguments{2, 1, 0, 1, 0}, DrawIndexedArguments{1, 1, 3, 0, 0}};
+    const std::array<DrawIndexedArguments, 2> indexed{DrawIndexedArguments{2, 1, 0, 1, 0},
+                                                      DrawIndexedArguments{1, 1, 3, 0, 0}};
     const Buffer indexed_arguments = buffer_of<DrawIndexedArguments>(indexed, BufferUsage::indirect);
     const std::array<std::uint32_t, 4> index_values{4, 2, 0, 7};
     const Buffer indices = buffer_of<std::uint32_t>(index_values, BufferUsage::index);
@@ -220,13 +231,15 @@ TEST_P(Vertices, IndirectArgumentsFromACompute) {
         layout(set = 0, binding = 0) buffer Arguments { uint values[4]; };
         void main() { values[0] = 3u; values[1] = 1u; values[2] = 0u; values[3] = 0u; }
     )");
-    const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc("", "uvec4(gl_VertexIndex, 0u, 0u, 0u)")));
+    const GraphicsPipeline pipeline =
+        ok(device().create_graphics_pipeline(desc("", "uvec4(gl_VertexIndex, 0u, 0u, 0u)")));
     const Texture picture = target(Format::rgba32_uint, width, height);
     CommandList list = device().create_command_list("indirect");
     list.set_pipeline(fill);
     list.set_bind_group(0, group(fill, {{.binding = 0, .buffer = arguments}}));
     list.dispatch({});
-    list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear, .clear = {.uint = {9, 9, 9, 9}}}}});
+    list.begin_render_pass(
+        {.color = {{.view = picture, .load = LoadOperation::clear, .clear = {.uint = {9, 9, 9, 9}}}}});
     list.set_pipeline(pipeline);
     list.draw_indirect(arguments);
     list.end_render_pass();
@@ -252,7 +265,8 @@ TEST_P(Vertices, StorageBuffersInVertexShaders) {
     SKIP_WITHOUT(capabilities().storage_in_vertex);
     const std::array<std::uint32_t, 4> values{5, 6, 7, 8};
     const Buffer storage = buffer_of<std::uint32_t>(values, BufferUsage::storage);
-    GraphicsPipelineDesc wanted = desc("layout(set = 0, binding = 0) readonly buffer Values { uint values[]; };", "uvec4(values[gl_VertexIndex], 0u, 0u, 0u)");
+    GraphicsPipelineDesc wanted = desc("layout(set = 0, binding = 0) readonly buffer Values { uint values[]; };",
+                                       "uvec4(values[gl_VertexIndex], 0u, 0u, 0u)");
     const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(wanted));
     const BindGroup bound = group(pipeline, {{.binding = 0, .buffer = storage}});
     const auto texels = draw(wanted, [&](CommandList& list) {
@@ -267,7 +281,8 @@ TEST_P(Vertices, Topologies) {
         GraphicsPipelineDesc wanted;
         // Points and lines run through centers of texels, edges of triangles between them.
         const bool triangles = topology == Topology::triangle_list || topology == Topology::triangle_strip;
-        wanted.vertex = shader(ShaderStage::vertex, std::string("const float start = ") + (triangles ? "2.0" : "2.5") + ";" + R"(
+        wanted.vertex =
+            shader(ShaderStage::vertex, std::string("const float start = ") + (triangles ? "2.0" : "2.5") + ";" + R"(
             void main() {
                 // A zigzag over a picture of 16x16 texels.
                 vec2 at = vec2(float(gl_VertexIndex / 2) * 6.0 + start, start + (gl_VertexIndex % 2 == 0 ? 0.0 : 10.0));
@@ -275,7 +290,8 @@ TEST_P(Vertices, Topologies) {
                 gl_PointSize = 1.0;
             }
         )");
-        wanted.fragment = shader(ShaderStage::fragment, "layout(location = 0) out vec4 color; void main() { color = vec4(1); }");
+        wanted.fragment =
+            shader(ShaderStage::fragment, "layout(location = 0) out vec4 color; void main() { color = vec4(1); }");
         wanted.topology = topology;
         wanted.color_targets = {{.format = Format::r8_unorm}};
         const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(wanted));
@@ -307,9 +323,13 @@ TEST_P(Vertices, CullingSeesThePictureFromTheTop) {
             for (const FrontFace front : {FrontFace::counter_clockwise, FrontFace::clockwise}) {
                 GraphicsPipelineDesc wanted;
                 // On the picture (y down) the corners (-1,-1), (3,-1), (-1,3) run clockwise.
-                wanted.vertex = shader(ShaderStage::vertex, std::string("void main() { int i = ") + (clockwise ? "gl_VertexIndex" : "2 - gl_VertexIndex") +
-                                       "; gl_Position = vec4(i == 1 ? 3.0 : -1.0, i == 2 ? 3.0 : -1.0, 0.0, 1.0); }");
-                wanted.fragment = shader(ShaderStage::fragment, "layout(location = 0) out vec4 color; void main() { color = vec4(gl_FrontFacing ? 1.0 : 0.2); }");
+                wanted.vertex = shader(
+                    ShaderStage::vertex,
+                    std::string("void main() { int i = ") + (clockwise ? "gl_VertexIndex" : "2 - gl_VertexIndex") +
+                        "; gl_Position = vec4(i == 1 ? 3.0 : -1.0, i == 2 ? 3.0 : -1.0, 0.0, 1.0); }");
+                wanted.fragment = shader(
+                    ShaderStage::fragment,
+                    "layout(location = 0) out vec4 color; void main() { color = vec4(gl_FrontFacing ? 1.0 : 0.2); }");
                 wanted.cull = cull;
                 wanted.front_face = front;
                 wanted.color_targets = {{.format = Format::r8_unorm}};
@@ -323,7 +343,9 @@ TEST_P(Vertices, CullingSeesThePictureFromTheTop) {
                 run(std::move(list));
                 const bool is_front = clockwise == (front == FrontFace::clockwise);
                 const bool culled = (cull == CullMode::front && is_front) || (cull == CullMode::back && !is_front);
-                EXPECT_EQ(read<std::uint8_t>(picture)[0], culled ? 0 : is_front ? 255 : 51)
+                EXPECT_EQ(read<std::uint8_t>(picture)[0], culled     ? 0
+                                                          : is_front ? 255
+                                                                     : 51)
                     << clockwise << " " << static_cast<int>(cull) << " " << static_cast<int>(front);
             }
 }

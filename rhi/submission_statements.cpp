@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// Verify mode: what a pass says that it uses against what its commands do.
+#include "rhi/submission_walk.h"
+
+namespace nacre::rhi {
+
+void SubmissionWalk::note_statement() {
+    if (!in_statement_ || !device_.shared->desc.verify_statements) return;
+    for (const BufferObject* buffer : tracker_.scope_buffers())
+        actual_[{false, buffer->handle.index}] |= buffer->scope_state.use;
+    for (const TextureObject* texture : tracker_.scope_textures()) {
+        ResourceUse use = texture->scope_state.use;
+        for (const ResourceState& part : texture->scope_states) use |= part.use;
+        actual_[{true, texture->handle.index}] |= use;
+    }
+}
+
+void SubmissionWalk::end_statement() {
+    if (!device_.shared->desc.verify_statements) return;
+    std::map<std::pair<bool, std::uint64_t>, ResourceUse> stated;
+    for (const StatedAccess& access : stated_) {
+        if (access.buffer) stated[{false, access.buffer.index}] |= access.use;
+        if (access.texture) stated[{true, access.texture.index}] |= access.use;
+    }
+    const auto name_of_resource = [&](std::pair<bool, std::uint64_t> key) -> std::string {
+        std::string name;
+        if (key.first)
+            tables_.textures.for_each([&](TextureObject& texture) {
+                if (texture.handle.index == key.second) name = "texture '" + texture.desc.name + "'";
+            });
+        else
+            tables_.buffers.for_each([&](BufferObject& buffer) {
+                if (buffer.handle.index == key.second) name = "buffer '" + buffer.desc.name + "'";
+            });
+        return name.empty() ? "a destroyed resource" : name;
+    };
+    const auto tell = [&](Rule rule, std::pair<bool, std::uint64_t> key, ResourceUse expected, ResourceUse found,
+                          std::string remedy) {
+        statement_problems_.push_back(
+            {rule, ErrorCode::validation, "verify statement", "'" + statement_name_ + "', " + name_of_resource(key),
+             "the statement names " + text_of(expected) + ", the commands use " + text_of(found), std::move(remedy)});
+    };
+    for (const auto& [key, found] : actual_) {
+        const auto at = stated.find(key);
+        const ResourceUse expected = at == stated.end() ? ResourceUse::none : at->second;
+        if (has_any(found, ~expected))
+            tell(Rule::statement_missing, key, expected, found,
+                 "Add " + text_of(found & ~expected) + " to the statement.");
+    }
+    for (const auto& [key, expected] : stated) {
+        const auto at = actual_.find(key);
+        const ResourceUse found = at == actual_.end() ? ResourceUse::none : at->second;
+        if (has_any(expected, ~found))
+            tell(Rule::statement_superfluous, key, expected, found,
+                 "Remove " + text_of(expected & ~found) + " from the statement.");
+    }
+}
+
+}  // namespace nacre::rhi
