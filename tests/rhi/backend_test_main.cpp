@@ -2,6 +2,7 @@
 // Runs the tests of all backends, makes sure that each backend present ran some, and keeps docs/support.md true.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
@@ -160,8 +161,12 @@ int run(int argc, char** argv) {
         std::ofstream(path) << now;
         std::cout << "wrote " << path << "\n";
     } else if (status == 0 && old != now) {
+        // The table tells of the software drivers, which are the same everywhere; a graphics card may do more or less.
+        const auto adapters = instance().adapters();
+        const bool is_reference = std::all_of(adapters.begin(), adapters.end(),
+                                              [](const rhi::AdapterInfo& adapter) { return adapter.is_software; });
         std::cerr << "docs/support.md is not what the tests found; run rhi_backend_test --update-support\n";
-        status = 1;
+        if (is_reference) status = 1;
     }
     return status;
 }
