@@ -47,14 +47,16 @@ Expected<void> SubmissionWalk::walk(CommandStream& stream) {
 
 SubmissionWalk::Step SubmissionWalk::hazard(const char* attempted, std::string what, ResourceState state,
                                             bool is_texture) const {
-    return Problem{is_texture ? Rule::texture_hazard : Rule::buffer_hazard,
-                   ErrorCode::validation,
-                   attempted,
-                   place() + ", " + what,
-                   "expected uses that can be had at the same time, found " + text_of(state) + " in one " +
-                       (pass_ ? "render pass" : "command"),
-                   pass_ ? "Split the render pass, or use another resource for one of the two."
-                         : "Use another resource for one of the two, or split the work."};
+    return Problem{
+        is_texture ? Rule::texture_hazard : Rule::buffer_hazard,
+        ErrorCode::validation,
+        attempted,
+        place() + ", " + what,
+        "expected uses that can be had at the same time, found " + text_of(state) + " in one " +
+            (pass_ ? "render pass" : "command"),
+        pass_ ? "Declare it readonly in shaders that only read it, split the render pass, or use another resource for "
+                "one of the two."
+              : "Declare it readonly in shaders that only read it, or use another resource for one of the two."};
 }
 
 SubmissionWalk::Step SubmissionWalk::resolve_view(ViewReference& view, const char* attempted, TextureObject*& texture,
