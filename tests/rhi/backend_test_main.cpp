@@ -84,7 +84,10 @@ class Results : public ::testing::EmptyTestEventListener {
         text << "\n|---|";
         for (std::size_t i = 0; i < all_variants().size(); ++i) text << "---|";
         text << "\n";
-        for (const auto& key : order_) {
+        // Suites by name: in which order they are registered differs between builds.
+        std::vector<std::pair<std::string, std::string>> rows = order_;
+        std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+        for (const auto& key : rows) {
             const std::string row = key.first + ": " + words(key.second);
             text << "| " << row << " |";
             for (const Variant& variant : all_variants()) {
