@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "rhi/resources.h"
+
+/// @file
+/// Textures as shaders and the rasterizer see them: where the texels are, and how to read them.
+///
+/// Texels lie in rows without padding between texels: texel (x, y, z) of sample s, layer l and mip m is at
+///     levels[m].data + l * levels[m].layer_stride + s * levels[m].sample_stride + z * levels[m].slice_stride
+///                    + y * levels[m].row_stride + x * block_bytes
+/// Block-compressed formats lie there as blocks (x and y counted in blocks). Depth-stencil formats lie as two planes: depth
+/// (d24 as 32 bits with the value in the low 24, d16 as 16, d32 as float) in the levels, stencil (8 bits) in `stencil_levels`.
+
+namespace nacre::cpu {
+
+inline constexpr std::uint32_t max_mips = 16;
+
+struct ImageLevel {
+    std::byte* data = nullptr;
+    std::uint32_t width = 0, height = 0, depth = 0;  ///< Texels.
+    std::uint32_t row_stride = 0;                    ///< Bytes.
+    std::uint64_t slice_stride = 0, layer_stride = 0, sample_stride = 0;
+};
+
+/// A part of a texture in one dimension and format. Levels count from the view's first mip, layers from its first layer.
+struct ImageView {
+    rhi::Format format = rhi::Format::undefined;
+    rhi::ViewDimension dimension = rhi::ViewDimension::d2;
+    std::uint32_t mip_count = 0;
+    std::uint32_t layer_count = 0;   ///< Cubes: 6 for each cube. 3D: 1.
+    std::uint32_t samples = 1;
+    std::uint32_t texel_bytes = 0;   ///< Of a texel, or of a block.
+    std::array<ImageLevel, max_mips> levels{};
+    std::array<ImageLevel, max_mips> stencil_levels{};
+};
+
+/// A sampler, prepared.
+struct SamplerState {
+    rhi::SamplerDesc desc;
+};
+
+}  // namespace nacre::cpu

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "backends/cpu/image_view.h"
+#include "backends/cpu/program.h"
+#include "backends/cpu/scheduler.h"
+#include "rhi/command_list.h"
+#include "rhi/pipeline.h"
+
+/// @file
+/// Draws triangles, lines and points with compiled shaders, by the rules of the Vulkan specification.
+
+namespace nacre::cpu {
+
+/// What a graphics pipeline fixes. `fragment.run` is null for depth-only pipelines.
+struct RasterPipeline {
+    VertexProgram vertex;
+    FragmentProgram fragment;
+    /// For each of fragment.inputs the slot of VertexBatch::outputs that it reads; ~0u reads zero.
+    std::vector<std::uint32_t> input_slots;
+    rhi::Topology topology = rhi::Topology::triangle_list;
+    rhi::CullMode cull = rhi::CullMode::none;
+    rhi::FrontFace front_face = rhi::FrontFace::counter_clockwise;
+    rhi::FillMode fill = rhi::FillMode::fill;
+    std::uint32_t samples = 1;
+    bool alpha_to_coverage = false;
+    rhi::DepthStencilState depth_stencil{};
+    std::vector<rhi::ColorTargetState> color_targets;
+};
+
+/// Targets of a render pass. Views have one mip and one layer.
+struct RenderTargets {
+    std::vector<ImageView> colors;
+    ImageView depth_stencil{};  ///< format undefined: none.
+    std::uint32_t width = 0, height = 0, samples = 1;
+};
+
+struct DrawState {
+    const RasterPipeline* pipeline = nullptr;
+    ShaderContext context{};
+    VertexDraw vertex{};
+    rhi::Viewport viewport{};
+    rhi::Rectangle scissor{};
+    std::uint8_t stencil_reference = 0;
+    std::array<float, 4> blend_constants{};
+};
+
+struct DrawCall {
+    bool indexed = false;
+    rhi::IndexType index_type = rhi::IndexType::uint32;
+    const std::byte* indices = nullptr;  ///< First byte of the index buffer's bound range.
+    std::uint64_t index_bytes = 0;       ///< Of that range; indices behind it read as 0.
+    std::uint32_t first = 0;             ///< First vertex, or first index.
+    std::uint32_t count = 0;             ///< Vertices or indices.
+    std::uint32_t first_instance = 0, instance_count = 1;
+    std::int32_t vertex_offset = 0;
+};
+
+/// Carries out the draws of render passes, one after another, on the threads of a scheduler. Not thread-safe.
+class Rasterizer {
+  public:
+    Rasterizer(Scheduler& scheduler, std::uint32_t lanes);
+    ~Rasterizer();
+
+    void begin_pass(const RenderTargets& targets);
+    void draw(const DrawState& state, const DrawCall& call);
+    /// All draws of the pass are finished, and their writes in the targets, when this returns.
+    void end_pass();
+    /// Samples that passed depth and stencil tests since the begin of the pass, all draws so far finished.
+    std::uint64_t passed_samples();
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace nacre::cpu
