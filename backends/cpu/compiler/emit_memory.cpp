@@ -1,0 +1,621 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <llvm/IR/Constants.h>
+#include <llvm/IR/GlobalVariable.h>
+#include <llvm/IR/Intrinsics.h>
+
+#include "backends/cpu/compiler/emitter.h"
+
+namespace nacre::cpu {
+
+using spv::Op;
+using spv::StorageClass;
+
+namespace {
+
+/// Scalars of a variable up to which each load and store names its slots one by one.
+constexpr std::uint32_t most_direct_components = 4096;
+
+}  // namespace
+
+LaneVariable& Emitter::make_lane_variable(Id variable_id, Id type_id, bool is_uniform) {
+    auto& made = lane_variables[variable_id];
+    const Type& type = module.type(type_id);
+    if (!made) {
+        made = std::make_unique<LaneVariable>();
+        made->type = type_id;
+        made->is_uniform = is_uniform;
+        made->slot_bytes = type.has_wide ? 8 : 4;
+        const std::uint64_t bytes = std::uint64_t{type.components} * made->slot_bytes * (is_uniform ? 1 : lanes);
+        if (bytes > (1u << 24))
+            reject(fmt::format("a variable of {} scalars takes {} bytes for {} lanes; 16 MiB is the most", type.components, bytes, lanes));
+        made->memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::max<std::uint64_t>(bytes, 1)), "variable");
+    }
+    return *made;
+}
+
+void Emitter::fill(LaneVariable& variable, const std::vector<Component>& values, llvm::Value*) {
+    std::uint32_t index = 0;
+    for (const Component& component : values) {
+        llvm::Value* value = component.value;
+        if (value->getType()->getScalarType()->isIntegerTy(1))
+            value = builder.CreateZExt(value, value->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt32Ty()))
+                                                                             : builder.getInt32Ty());
+        if (!variable.is_uniform) value = widen(Component(value));
+        const std::uint64_t at = std::uint64_t{index++} * variable.slot_bytes * (variable.is_uniform ? 1 : lanes);
+        builder.CreateAlignedStore(value, at_offset(variable.memory, static_cast<std::int64_t>(at)), llvm::Align(variable.slot_bytes));
+    }
+}
+
+Pointer Emitter::pointer_to(Id id) {
+    const Variable& variable = *module.variable(id);
+    const Type& type = module.type(variable.type);
+    Pointer pointer;
+    pointer.storage = variable.storage;
+    pointer.type = variable.type;
+    switch (variable.storage) {
+        case StorageClass::Function:
+        case StorageClass::Private:
+        case StorageClass::Output:
+        case StorageClass::Input:
+            pointer.kind = Pointer::Kind::lanes;
+            pointer.variable_id = id;
+            if (const auto found = lane_variables.find(id); found != lane_variables.end()) pointer.variable = found->second.get();
+            else if (variable.storage == StorageClass::Input) {
+                auto made = std::make_unique<LaneVariable>();
+                made->type = variable.type;
+                made->components = input_components(variable);
+                pointer.variable = made.get();
+                lane_variables.emplace(id, std::move(made));
+            } else {
+                pointer.variable = &make_lane_variable(id, variable.type, !uniformity.has_divergent_content(id));
+            }
+            return pointer;
+        case StorageClass::Workgroup: {
+            pointer.kind = Pointer::Kind::bytes;
+            const auto found = workgroup_offsets.find(id);
+            if (found == workgroup_offsets.end()) reject("a workgroup variable was not declared");
+            pointer.base = workgroup_memory();
+            pointer.offset = static_cast<std::int64_t>(found->second);
+            return pointer;
+        }
+        case StorageClass::PushConstant:
+            pointer.kind = Pointer::Kind::bytes;
+            pointer.base = load_context(offsetof(ShaderContext, push_constants), pointer_type);
+            pointer.limit = int64(push_constant_capacity);
+            pointer.needs_limit_check = true;
+            pointer.invariant = true;
+            return pointer;
+        case StorageClass::Uniform:
+        case StorageClass::StorageBuffer:
+        case StorageClass::UniformConstant:
+            pointer.kind = Pointer::Kind::descriptor;
+            pointer.set = variable.set.value_or(0);
+            pointer.binding = variable.binding.value_or(0);
+            if (type.kind == TypeKind::structure) return buffer_pointer(pointer);
+            return pointer;
+        default: reject(fmt::format("storage class {} is not supported", static_cast<unsigned>(variable.storage)));
+    }
+}
+
+Component Emitter::descriptor(const Pointer& pointer) {
+    const BindingSlots* slot = slots.find(pointer.set, pointer.binding);
+    if (!slot) reject(fmt::format("set {} binding {} is not in the pipeline's layout", pointer.set, pointer.binding));
+    const std::size_t group_offset = offsetof(ShaderContext, groups) + pointer.set * sizeof(void*);
+    llvm::Value* group = load_context(group_offset, pointer_type);
+    const Component index = pointer.descriptor_index;
+    if (!index) return Component(at_offset(group, std::int64_t{slot->first} * static_cast<std::int64_t>(sizeof(Descriptor))));
+    // Indices out of range find a descriptor of nothing.
+    auto*& nothing = shared_["nothing"];
+    if (!nothing) {
+        auto* type = llvm::ArrayType::get(builder.getInt64Ty(), sizeof(Descriptor) / 8);
+        nothing = new llvm::GlobalVariable(target, type, true, llvm::GlobalValue::InternalLinkage,
+                                           llvm::Constant::getNullValue(type), "no_descriptor");
+    }
+    llvm::Value* count = int32(slot->count);
+    if (slot->count == 0) {
+        llvm::Value* size = load_context(offsetof(ShaderContext, group_sizes) + pointer.set * 4, builder.getInt32Ty());
+        count = builder.CreateSub(size, int32(slot->first));
+    }
+    llvm::Value* first = at_offset(group, std::int64_t{slot->first} * static_cast<std::int64_t>(sizeof(Descriptor)));
+    if (index.is_uniform()) {
+        llvm::Value* wide = builder.CreateZExt(index.value, builder.getInt64Ty());
+        llvm::Value* address = builder.CreateGEP(builder.getInt8Ty(), first, builder.CreateMul(wide, int64(sizeof(Descriptor))));
+        return Component(select(builder.CreateICmpULT(index.value, count), address, nothing));
+    }
+    llvm::Value* wide = builder.CreateZExt(index.value, vector_of(builder.getInt64Ty()));
+    llvm::Value* address = builder.CreateGEP(builder.getInt8Ty(), first, builder.CreateMul(wide, splat(int64(sizeof(Descriptor)))));
+    return Component(select(builder.CreateICmpULT(index.value, splat(count)), address, splat(nothing)));
+}
+
+Pointer Emitter::buffer_pointer(const Pointer& block) {
+    Pointer pointer = block;
+    pointer.kind = Pointer::Kind::bytes;
+    const Component address = descriptor(block);
+    if (address.is_uniform()) {
+        pointer.base = invariant_load(pointer_type, at_offset(address.value, offsetof(Descriptor, data)), 8);
+        pointer.limit = invariant_load(builder.getInt64Ty(), at_offset(address.value, offsetof(Descriptor, size)), 8);
+    } else {
+        // A different buffer in each lane.
+        const auto gather = [&](std::size_t offset, llvm::Type* kind) -> llvm::Value* {
+            llvm::Value* places = builder.CreateGEP(builder.getInt8Ty(), address.value, int64(static_cast<std::int64_t>(offset)));
+            return builder.CreateMaskedGather(vector_of(kind), places, llvm::Align(8), all_lanes(), llvm::Constant::getNullValue(vector_of(kind)));
+        };
+        pointer.base = builder.CreateIntToPtr(gather(offsetof(Descriptor, data), builder.getInt64Ty()), vector_of(pointer_type));
+        pointer.limit = gather(offsetof(Descriptor, size), builder.getInt64Ty());
+    }
+    pointer.needs_limit_check = true;
+    const Type& type = module.type(block.type);
+    pointer.invariant = block.storage == StorageClass::Uniform && type.is_block;
+    // Old SPIR-V marks storage buffers as BufferBlock in the Uniform class: those are written.
+    if (pointer.invariant && !module.is_uniform_block(block.type)) pointer.invariant = false;
+    return pointer;
+}
+
+Pointer Emitter::access(Pointer pointer, Id index_id) {
+    const Type& type = module.type(pointer.type);
+    const std::optional<std::uint32_t> fixed = module.constant_word(index_id);
+    if (pointer.kind == Pointer::Kind::descriptor) {
+        // An element of an array of resources.
+        if (type.kind == TypeKind::array || type.kind == TypeKind::runtime_array) {
+            Component index = get_scalar(index_id);
+            if (index.value->getType()->getScalarSizeInBits() != 32)
+                index = apply({index}, [&](auto v) {
+                    return builder.CreateZExtOrTrunc(v[0], v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt32Ty())) : builder.getInt32Ty());
+                });
+            if (pointer.descriptor_index) reject("arrays of arrays of resources are not supported");
+            pointer.descriptor_index = index;
+            pointer.type = type.element;
+            return module.type(pointer.type).kind == TypeKind::structure ? buffer_pointer(pointer) : pointer;
+        }
+        reject("a resource is indexed that is no array");
+    }
+    if (type.kind == TypeKind::structure) {
+        const std::uint32_t number = fixed.value_or(0);
+        const Member& member = type.members.at(number);
+        if (pointer.kind == Pointer::Kind::lanes) {
+            pointer.component += member.first_component;
+        } else {
+            pointer.offset += pointer.storage == StorageClass::Workgroup
+                                  ? static_cast<std::int64_t>(module.tight_offset(pointer.type, number))
+                                  : static_cast<std::int64_t>(member.offset);
+            pointer.row_major = member.row_major, pointer.matrix_stride = member.matrix_stride;
+        }
+        pointer.type = member.type;
+        return pointer;
+    }
+
+    const bool is_unbounded = type.kind == TypeKind::runtime_array;
+    const std::uint32_t count = type.count;
+    // What one step of the index is worth.
+    std::int64_t step = 0;
+    if (pointer.kind == Pointer::Kind::lanes) {
+        step = module.type(type.element).components;
+    } else if (type.kind == TypeKind::vector) {
+        step = pointer.component_stride ? pointer.component_stride : module.type(type.element).bits / 8;
+        if (module.type(type.element).kind == TypeKind::boolean) step = 4;
+    } else if (type.kind == TypeKind::matrix) {
+        const Type& column = module.type(type.element);
+        const std::uint32_t scalar = module.type(column.element).bits / 8;
+        std::uint32_t stride = pointer.matrix_stride;
+        if (pointer.storage == StorageClass::Workgroup || stride == 0) stride = column.count * scalar, pointer.row_major = false;
+        step = pointer.row_major ? scalar : stride;
+        pointer.component_stride = pointer.row_major ? stride : 0;
+    } else {
+        step = pointer.storage == StorageClass::Workgroup || type.array_stride == 0
+                   ? static_cast<std::int64_t>(module.tight_size(type.element))
+                   : type.array_stride;
+    }
+    pointer.type = type.element;
+
+    if (fixed && !is_unbounded) {
+        if (*fixed >= count) {
+            pointer.valid = builder.getFalse();
+            return pointer;
+        }
+        if (pointer.kind == Pointer::Kind::lanes) pointer.component += static_cast<std::uint32_t>(*fixed * step);
+        else pointer.offset += *fixed * step;
+        return pointer;
+    }
+    Component index = get_scalar(index_id);
+    const unsigned bits = index.value->getType()->getScalarSizeInBits();
+    if (bits != 32) {
+        // Wide indices that do not fit stay out of range.
+        const bool is_signed = module.type(module.type_of(index_id)).is_signed;
+        index = apply({index}, [&](auto v) {
+            llvm::Type* kind = v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt32Ty())) : builder.getInt32Ty();
+            if (bits < 32) return is_signed ? builder.CreateSExt(v[0], kind) : builder.CreateZExt(v[0], kind);
+            llvm::Value* fits = builder.CreateICmpULE(v[0], llvm::ConstantInt::get(v[0]->getType(), 0x7fffffff));
+            return builder.CreateSelect(fits, builder.CreateTrunc(v[0], kind), llvm::ConstantInt::get(kind, 0x7fffffff));
+        });
+    }
+    Component bound = int32(count);
+    if (is_unbounded) {
+        // As many elements as fit behind the array's begin.
+        bound = apply({pointer.limit}, [&](auto v) {
+            llvm::Value* begin = llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(pointer.offset));
+            llvm::Value* room = builder.CreateSelect(builder.CreateICmpUGE(v[0], begin), builder.CreateSub(v[0], begin),
+                                                     llvm::Constant::getNullValue(v[0]->getType()));
+            llvm::Type* kind = v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt32Ty())) : builder.getInt32Ty();
+            return builder.CreateTrunc(builder.CreateUDiv(room, llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(std::max<std::int64_t>(step, 1)))), kind);
+        });
+    }
+    const Component in_range = apply({index, bound}, [&](auto v) { return builder.CreateICmpULT(v[0], v[1]); });
+    pointer.valid = logical_and(pointer.valid, in_range);
+    const Component scaled = multiply(index, step);
+    if (pointer.kind == Pointer::Kind::lanes) {
+        pointer.dynamic_component = add(pointer.dynamic_component, scaled);
+    } else {
+        pointer.dynamic_offset = add(pointer.dynamic_offset, scaled);
+        // Below the bound, every byte of the element lies inside of the range.
+        if (is_unbounded) pointer.needs_limit_check = false;
+    }
+    return pointer;
+}
+
+Component Emitter::allowed(const Pointer& pointer, std::int64_t extra, std::uint32_t bytes) {
+    Component ok = pointer.valid;
+    if (!pointer.needs_limit_check) return ok;
+    const std::int64_t end = pointer.offset + extra + bytes;
+    const Component fits = apply({pointer.limit}, [&](auto v) {
+        return builder.CreateICmpUGE(v[0], llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(end)));
+    });
+    ok = logical_and(ok, fits);
+    if (pointer.dynamic_offset) {
+        const Component room = apply({pointer.limit}, [&](auto v) {
+            return builder.CreateSub(v[0], llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(end)));
+        });
+        ok = logical_and(ok, apply({pointer.dynamic_offset, room}, [&](auto v) {
+                             return builder.CreateICmpULE(builder.CreateZExt(v[0], v[1]->getType()), v[1]);
+                         }));
+    }
+    return ok;
+}
+
+llvm::Value* Emitter::addresses(const Pointer& pointer, std::int64_t extra) {
+    const std::int64_t fixed = pointer.offset + extra;
+    llvm::Value* base = pointer.base.value;
+    if (fixed) base = builder.CreateGEP(builder.getInt8Ty(), base, int64(fixed));
+    if (!pointer.dynamic_offset) return base;
+    // 32-bit offsets are signed for the hardware's gathers; no range is longer than 2^31 - 1.
+    llvm::Value* offset = pointer.dynamic_offset.value;
+    if (!offset->getType()->isVectorTy()) offset = builder.CreateSExt(offset, builder.getInt64Ty());
+    return builder.CreateGEP(builder.getInt8Ty(), base, offset);
+}
+
+Component Emitter::load_bytes(const Pointer& pointer, std::int64_t extra, const Type& scalar) {
+    const bool is_boolean = scalar.kind == TypeKind::boolean;
+    llvm::Type* kind = is_boolean ? builder.getInt32Ty() : scalar_type(scalar);
+    const std::uint32_t bytes = is_boolean ? 4 : scalar.bits / 8;
+    const Component ok = allowed(pointer, extra, bytes);
+    llvm::Value* address = addresses(pointer, extra);
+    const llvm::Align alignment(bytes >= 4 ? 4 : bytes);
+    const auto finish = [&](llvm::Value* value) -> Component {
+        if (is_boolean) return builder.CreateICmpNE(value, llvm::Constant::getNullValue(value->getType()));
+        return value;
+    };
+    if (!address->getType()->isVectorTy()) {
+        if (ok && !ok.is_uniform()) {
+            // One place, but not all lanes may see it.
+            llvm::Value* seen = builder.CreateAlignedLoad(kind, select(any(ok.value), address, zeros()), alignment);
+            return finish(select(ok.value, splat(seen), llvm::Constant::getNullValue(vector_of(kind))));
+        }
+        if (ok) address = select(ok.value, address, zeros());
+        llvm::LoadInst* value = builder.CreateAlignedLoad(kind, address, alignment);
+        if (pointer.invariant) value->setMetadata(llvm::LLVMContext::MD_invariant_load, llvm::MDNode::get(context, {}));
+        return finish(value);
+    }
+    llvm::Value* lanes_on = ok ? both(mask, ok.value) : mask;
+    llvm::Value* none = llvm::Constant::getNullValue(vector_of(kind));
+    if (pointer.base.is_uniform() && pointer.dynamic_offset.linear_base && pointer.dynamic_offset.linear_stride == bytes) {
+        llvm::Value* start = builder.CreateGEP(builder.getInt8Ty(), at_offset(pointer.base.value, pointer.offset + extra),
+                                               builder.CreateSExt(pointer.dynamic_offset.linear_base, builder.getInt64Ty()));
+        return finish(builder.CreateMaskedLoad(vector_of(kind), start, alignment, lanes_on, none));
+    }
+    return finish(builder.CreateMaskedGather(vector_of(kind), address, alignment, lanes_on, none));
+}
+
+void Emitter::store_bytes(const Pointer& pointer, std::int64_t extra, const Type& scalar, const Component& value) {
+    if (pointer.storage != StorageClass::Workgroup) has_side_effects = true;
+    const bool is_boolean = scalar.kind == TypeKind::boolean;
+    const std::uint32_t bytes = is_boolean ? 4 : scalar.bits / 8;
+    const Component ok = allowed(pointer, extra, bytes);
+    llvm::Value* address = addresses(pointer, extra);
+    const llvm::Align alignment(bytes >= 4 ? 4 : bytes);
+    Component stored = value;
+    if (is_boolean)
+        stored = apply({value}, [&](auto v) {
+            return builder.CreateZExt(v[0], v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt32Ty())) : builder.getInt32Ty());
+        });
+    llvm::Value* lanes_on = both(effect_mask(), ok ? ok.value : nullptr);
+    if (!address->getType()->isVectorTy()) {
+        // All lanes write to one place: the last of them wins.
+        llvm::Value* last = stored.value;
+        if (!stored.is_uniform()) {
+            llvm::Value* leading = builder.CreateIntrinsic(llvm::Intrinsic::ctlz, {builder.getInt32Ty()},
+                                                           {builder.CreateOr(mask_bits(lanes_on), int32(1)), builder.getTrue()});
+            last = builder.CreateExtractElement(stored.value, builder.CreateSub(int32(31), leading));
+        }
+        llvm::AllocaInst*& nowhere = nowhere_slot;
+        if (!nowhere) nowhere = make_slot(builder.getInt64Ty(), "nowhere");
+        builder.CreateAlignedStore(last, select(any(lanes_on), address, nowhere), alignment);
+        return;
+    }
+    llvm::Value* values = widen(stored);
+    if (pointer.base.is_uniform() && pointer.dynamic_offset.linear_base && pointer.dynamic_offset.linear_stride == bytes) {
+        llvm::Value* start = builder.CreateGEP(builder.getInt8Ty(), at_offset(pointer.base.value, pointer.offset + extra),
+                                               builder.CreateSExt(pointer.dynamic_offset.linear_base, builder.getInt64Ty()));
+        builder.CreateMaskedStore(values, start, alignment, lanes_on);
+        return;
+    }
+    builder.CreateMaskedScatter(values, address, alignment, lanes_on);
+}
+
+Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t index, const Type& scalar) {
+    LaneVariable& variable = *pointer.variable;
+    const std::uint32_t number = pointer.component + index;
+    const bool is_boolean = scalar.kind == TypeKind::boolean;
+    llvm::Type* kind = is_boolean ? builder.getInt32Ty() : scalar_type(scalar);
+    const auto finish = [&](llvm::Value* value) -> Component {
+        if (is_boolean) return builder.CreateICmpNE(value, llvm::Constant::getNullValue(value->getType()));
+        return value;
+    };
+    if (!pointer.dynamic_component) {
+        if (pointer.valid) {
+            // A constant index out of range.
+            if (const auto* never = llvm::dyn_cast<llvm::Constant>(pointer.valid.value); never && never->isNullValue()) return zero(scalar);
+        }
+        if (!variable.memory) return variable.components.at(number);
+        const std::uint32_t per_lane = variable.is_uniform ? 1 : lanes;
+        llvm::Value* address = at_offset(variable.memory, std::int64_t{number} * variable.slot_bytes * per_lane);
+        Component loaded = finish(builder.CreateAlignedLoad(variable.is_uniform ? kind : static_cast<llvm::Type*>(vector_of(kind)), address,
+                                                            llvm::Align(variable.slot_bytes)));
+        if (pointer.valid)
+            loaded = apply({pointer.valid, loaded}, [&](auto v) { return select(v[0], v[1], llvm::Constant::getNullValue(v[1]->getType())); });
+        return loaded;
+    }
+    if (!variable.memory) {
+        // Inputs that are indexed dynamically get memory, once, where all of the function can see it.
+        LaneVariable spilled;
+        const Type& type = module.type(variable.type);
+        spilled.slot_bytes = type.has_wide ? 8 : 4;
+        spilled.memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * spilled.slot_bytes * lanes), "input");
+        fill(spilled, variable.components, mask);
+        Pointer through = pointer;
+        through.variable = &spilled;
+        spilled.type = variable.type;
+        return load_lane_component(through, index, scalar);
+    }
+    const Component element = pointer.dynamic_component;
+    if (element.is_uniform() && (!pointer.valid || pointer.valid.is_uniform())) {
+        llvm::Value* safe = pointer.valid ? select(pointer.valid.value, element.value, int32(0)) : element.value;
+        const std::uint32_t per_lane = variable.is_uniform ? 1 : lanes;
+        llvm::Value* offset = builder.CreateMul(builder.CreateAdd(safe, int32(number)), int32(variable.slot_bytes * per_lane));
+        // With the index forced to 0 the address may lie before the element, never outside of the variable.
+        llvm::Value* address = builder.CreateGEP(builder.getInt8Ty(), variable.memory, builder.CreateZExt(offset, builder.getInt64Ty()));
+        llvm::Value* value = builder.CreateAlignedLoad(variable.is_uniform ? kind : static_cast<llvm::Type*>(vector_of(kind)), address,
+                                                       llvm::Align(variable.slot_bytes));
+        if (pointer.valid) value = select(pointer.valid.value, value, llvm::Constant::getNullValue(value->getType()));
+        return finish(value);
+    }
+    llvm::Value* numbers = builder.CreateAdd(widen(element), splat(int32(number)));
+    llvm::Value* offsets = variable.is_uniform ? builder.CreateMul(numbers, splat(int32(variable.slot_bytes)))
+                                               : builder.CreateMul(builder.CreateAdd(builder.CreateMul(numbers, splat(int32(lanes))), lane_numbers()),
+                                                                   splat(int32(variable.slot_bytes)));
+    llvm::Value* places = builder.CreateGEP(builder.getInt8Ty(), variable.memory, offsets);
+    llvm::Value* lanes_on = both(mask, pointer.valid ? pointer.valid.value : nullptr);
+    return finish(builder.CreateMaskedGather(vector_of(kind), places, llvm::Align(variable.slot_bytes), lanes_on,
+                                             llvm::Constant::getNullValue(vector_of(kind))));
+}
+
+void Emitter::store_lane_component(const Pointer& pointer, std::uint32_t index, const Type& scalar, const Component& value) {
+    LaneVariable& variable = *pointer.variable;
+    if (!variable.memory) reject("an input is written");
+    const std::uint32_t number = pointer.component + index;
+    const bool is_boolean = scalar.kind == TypeKind::boolean;
+    llvm::Type* kind = is_boolean ? builder.getInt32Ty() : scalar_type(scalar);
+    Component stored = value;
+    if (is_boolean)
+        stored = apply({value}, [&](auto v) {
+            return builder.CreateZExt(v[0], v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(kind)) : kind);
+        });
+    const std::uint32_t per_lane = variable.is_uniform ? 1 : lanes;
+    llvm::Type* held = variable.is_uniform ? kind : static_cast<llvm::Type*>(vector_of(kind));
+    const auto put = [&](llvm::Value* address, llvm::Value* condition) {
+        llvm::Value* values = variable.is_uniform ? narrow(stored, mask) : widen(stored);
+        llvm::Value* lanes_on = variable.is_uniform ? condition : both(mask, condition);
+        if (lanes_on && !is_all(lanes_on)) {
+            llvm::Value* old = builder.CreateAlignedLoad(held, address, llvm::Align(variable.slot_bytes));
+            values = select(lanes_on, values, old);
+        }
+        builder.CreateAlignedStore(values, address, llvm::Align(variable.slot_bytes));
+    };
+    if (!pointer.dynamic_component) {
+        if (pointer.valid)
+            if (const auto* never = llvm::dyn_cast<llvm::Constant>(pointer.valid.value); never && never->isNullValue()) return;
+        put(at_offset(variable.memory, std::int64_t{number} * variable.slot_bytes * per_lane), pointer.valid ? pointer.valid.value : nullptr);
+        return;
+    }
+    const Component element = pointer.dynamic_component;
+    if (element.is_uniform() && (!pointer.valid || pointer.valid.is_uniform())) {
+        llvm::Value* safe = pointer.valid ? select(pointer.valid.value, element.value, int32(0)) : element.value;
+        llvm::Value* offset = builder.CreateMul(builder.CreateAdd(safe, int32(number)), int32(variable.slot_bytes * per_lane));
+        put(builder.CreateGEP(builder.getInt8Ty(), variable.memory, builder.CreateZExt(offset, builder.getInt64Ty())),
+            pointer.valid ? pointer.valid.value : nullptr);
+        return;
+    }
+    if (variable.is_uniform) reject("a variable held to be uniform is written at different places");
+    llvm::Value* numbers = builder.CreateAdd(widen(element), splat(int32(number)));
+    llvm::Value* offsets = builder.CreateMul(builder.CreateAdd(builder.CreateMul(numbers, splat(int32(lanes))), lane_numbers()),
+                                             splat(int32(variable.slot_bytes)));
+    llvm::Value* places = builder.CreateGEP(builder.getInt8Ty(), variable.memory, offsets);
+    builder.CreateMaskedScatter(widen(stored), places, llvm::Align(variable.slot_bytes), both(mask, pointer.valid ? pointer.valid.value : nullptr));
+}
+
+void Emitter::visit_layout(const Pointer& pointer, Id type_id, std::int64_t extra,
+                           const std::function<void(const Pointer&, std::int64_t, const Type&)>& visit) {
+    const Type& type = module.type(type_id);
+    const bool is_tight = pointer.storage == StorageClass::Workgroup;
+    switch (type.kind) {
+        case TypeKind::boolean: case TypeKind::integer: case TypeKind::floating: visit(pointer, extra, type); return;
+        case TypeKind::vector: {
+            const Type& scalar = module.type(type.element);
+            const std::int64_t step = pointer.component_stride ? pointer.component_stride : scalar.kind == TypeKind::boolean ? 4 : scalar.bits / 8;
+            for (std::uint32_t i = 0; i < type.count; ++i) visit(pointer, extra + i * step, scalar);
+            return;
+        }
+        case TypeKind::matrix: {
+            const Type& column = module.type(type.element);
+            const std::int64_t scalar = module.type(column.element).bits / 8;
+            const bool has_stride = pointer.matrix_stride && !is_tight;
+            const std::int64_t stride = has_stride ? pointer.matrix_stride : column.count * scalar;
+            const bool by_rows = has_stride && pointer.row_major;
+            Pointer inner = pointer;
+            inner.component_stride = by_rows ? static_cast<std::uint32_t>(stride) : 0;
+            for (std::uint32_t i = 0; i < type.count; ++i)
+                visit_layout(inner, type.element, extra + i * (by_rows ? scalar : stride), visit);
+            return;
+        }
+        case TypeKind::array: {
+            const std::int64_t step = is_tight || type.array_stride == 0 ? static_cast<std::int64_t>(module.tight_size(type.element)) : type.array_stride;
+            for (std::uint32_t i = 0; i < type.count; ++i) visit_layout(pointer, type.element, extra + i * step, visit);
+            return;
+        }
+        case TypeKind::structure:
+            for (std::uint32_t i = 0; i < type.members.size(); ++i) {
+                const Member& member = type.members[i];
+                Pointer inner = pointer;
+                inner.row_major = member.row_major, inner.matrix_stride = member.matrix_stride, inner.component_stride = 0;
+                visit_layout(inner, member.type, extra + (is_tight ? static_cast<std::int64_t>(module.tight_offset(type_id, i)) : member.offset), visit);
+            }
+            return;
+        default: reject("a value of a type without size lies in memory");
+    }
+}
+
+std::vector<Component> Emitter::load(const Pointer& pointer) {
+    std::vector<Component> values;
+    if (module.type(pointer.type).components > most_direct_components * 16)
+        reject(fmt::format("a value of {} scalars is loaded at once", module.type(pointer.type).components));
+    if (pointer.kind == Pointer::Kind::lanes) {
+        std::uint32_t index = 0;
+        for_each_component_type(pointer.type, [&](const Type& scalar) { values.push_back(load_lane_component(pointer, index++, scalar)); });
+    } else if (pointer.kind == Pointer::Kind::bytes) {
+        visit_layout(pointer, pointer.type, 0, [&](const Pointer& at, std::int64_t extra, const Type& scalar) {
+            values.push_back(load_bytes(at, extra, scalar));
+        });
+    } else {
+        reject("a resource is loaded as a value");
+    }
+    return values;
+}
+
+void Emitter::store(const Pointer& pointer, const std::vector<Component>& values) {
+    std::size_t index = 0;
+    if (pointer.kind == Pointer::Kind::lanes) {
+        for_each_component_type(pointer.type, [&](const Type& scalar) {
+            store_lane_component(pointer, static_cast<std::uint32_t>(index), scalar, values.at(index));
+            ++index;
+        });
+    } else if (pointer.kind == Pointer::Kind::bytes) {
+        visit_layout(pointer, pointer.type, 0, [&](const Pointer& at, std::int64_t extra, const Type& scalar) {
+            store_bytes(at, extra, scalar, values.at(index++));
+        });
+    } else {
+        reject("a resource is written");
+    }
+}
+
+llvm::Value* Emitter::effect_mask() {
+    if (!live_slot) return mask;
+    return both(mask, live());
+}
+
+llvm::Value* Emitter::zeros() {
+    auto*& made = shared_["zeros"];
+    if (!made) {
+        auto* type = llvm::ArrayType::get(builder.getInt64Ty(), 1);
+        made = new llvm::GlobalVariable(target, type, true, llvm::GlobalValue::InternalLinkage, llvm::Constant::getNullValue(type), "zeros");
+    }
+    return made;
+}
+
+void Emitter::declare_variables() {
+    for (const auto& [id, variable] : module.variables())
+        if (variable.storage == StorageClass::Workgroup) {
+            workgroup_offsets[id] = workgroup_variable_bytes;
+            workgroup_variable_bytes += (module.tight_size(variable.type) + 15) / 16 * 16;
+        }
+    // Content of variables starts as the initializer says, or as zero: undefined would do, but not in every lane alike.
+    for (const auto& [id, variable] : module.variables()) {
+        if (variable.storage != StorageClass::Private && variable.storage != StorageClass::Output) continue;
+        LaneVariable& made = make_lane_variable(id, variable.type, !uniformity.has_divergent_content(id));
+        std::vector<Component> initial;
+        if (variable.initializer) initial = get(variable.initializer).components;
+        else if (module.type(variable.type).components <= most_direct_components)
+            for_each_component_type(variable.type, [&](const Type& scalar) { initial.push_back(zero(scalar)); });
+        fill(made, initial, all_lanes());
+    }
+}
+
+bool Emitter::emit_memory(const Instruction& at) {
+    switch (at.op) {
+        case Op::OpVariable: {
+            LaneVariable& variable = make_lane_variable(at.result, module.variable(at.result)->type,
+                                                        !uniformity.has_divergent_content(at.result));
+            if (at.operand(1)) {
+                Pointer pointer = pointer_to(at.result);
+                store(pointer, get(at.operand(1)).components);
+            } else if (const Type& type = module.type(variable.type); type.components <= 64) {
+                // In loops and repeated calls: not what an earlier round left there.
+                std::vector<Component> initial;
+                for_each_component_type(variable.type, [&](const Type& scalar) { initial.push_back(zero(scalar)); });
+                if (frame->function == &module.entry()) fill(variable, initial, mask);
+            }
+            return true;
+        }
+        case Op::OpAccessChain:
+        case Op::OpInBoundsAccessChain: {
+            Pointer pointer = *get(at.operand(0)).pointer;
+            for (const Id index : at.operands.subspan(1)) pointer = access(std::move(pointer), index);
+            define(at.result).pointer = std::make_shared<Pointer>(std::move(pointer));
+            finish_definition(at.result);
+            return true;
+        }
+        case Op::OpLoad: {
+            const Value from = get(at.operand(0));
+            const Type& type = module.type(at.type);
+            if (type.is_opaque()) {
+                const Component address = descriptor(*from.pointer);
+                Value& value = define(at.result);
+                value.image = address, value.sampler = address;
+                value.image_type = type.kind == TypeKind::sampled_image ? type.element : at.type;
+                finish_definition(at.result);
+                return true;
+            }
+            set(at, load(*from.pointer));
+            return true;
+        }
+        case Op::OpStore: store(*get(at.operand(0)).pointer, get(at.operand(1)).components); return true;
+        case Op::OpCopyMemory: store(*get(at.operand(0)).pointer, load(*get(at.operand(1)).pointer)); return true;
+        case Op::OpArrayLength: {
+            // Of the last member of the block that the pointer leads to.
+            Pointer block = *get(at.operand(0)).pointer;
+            const Type& type = module.type(block.type);
+            const Member& member = type.members.at(at.operand(1));
+            const std::uint32_t stride = std::max(1u, module.type(member.type).array_stride);
+            const std::int64_t begin = block.offset + member.offset;
+            set(at, {apply({block.limit}, [&](auto v) {
+                    llvm::Value* first = llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(begin));
+                    llvm::Value* room = builder.CreateSelect(builder.CreateICmpUGE(v[0], first), builder.CreateSub(v[0], first),
+                                                             llvm::Constant::getNullValue(v[0]->getType()));
+                    llvm::Value* count = builder.CreateUDiv(room, llvm::ConstantInt::get(v[0]->getType(), stride));
+                    return builder.CreateTrunc(count, v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt32Ty())) : builder.getInt32Ty());
+                })});
+            return true;
+        }
+        default: return false;
+    }
+}
+
+}  // namespace nacre::cpu
