@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
 #include <fmt/format.h>
 #include <llvm/IR/Constants.h>
 #include <llvm/IR/GlobalVariable.h>
@@ -546,9 +548,14 @@ void Emitter::declare_variables() {
             workgroup_offsets[id] = workgroup_variable_bytes;
             workgroup_variable_bytes += (module.tight_size(variable.type) + 15) / 16 * 16;
         }
+    // Inputs are made here, where everything that follows can see them.
+    for (const Id id : module.interface())
+        if (const Variable* variable = module.variable(id); variable && variable->storage == StorageClass::Input) pointer_to(id);
     // Content of variables starts as the initializer says, or as zero: undefined would do, but not in every lane alike.
     for (const auto& [id, variable] : module.variables()) {
         if (variable.storage != StorageClass::Private && variable.storage != StorageClass::Output) continue;
+        if (variable.storage == StorageClass::Output && std::ranges::find(module.interface(), id) == module.interface().end())
+            continue;  // Of another entry point.
         LaneVariable& made = make_lane_variable(id, variable.type, !uniformity.has_divergent_content(id));
         std::vector<Component> initial;
         if (variable.initializer) initial = get(variable.initializer).components;

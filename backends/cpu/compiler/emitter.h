@@ -194,6 +194,7 @@ class Emitter {
     Component from_word(const Component& word, llvm::Type* kind);       ///< Bits of 32 as a value of a type.
     Component to_word(const Component& value);
     bool emit_subgroup(const Instruction& at);                          // emit_subgroups.cpp
+    llvm::Value* permute(llvm::Value* values, llvm::Value* sources);    ///< Lane i gets the value of lane sources[i].
     virtual bool emit_stage(const Instruction&) { return false; }       // derivatives, barriers, interpolation
 
     // ---- Memory (emit_memory.cpp)

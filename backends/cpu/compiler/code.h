@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <llvm/IR/Module.h>
+
+#include "backends/cpu/program.h"
+#include "core/error.h"
+
+/// @file
+/// LLVM modules to code in memory, by LLVM's ORC JIT. One CodeGenerator serves a device; its calls are thread-safe.
+
+namespace nacre::cpu {
+
+/// Symbols of one compiled module.
+class LoadedCode : public CompiledCode {
+  public:
+    /// Address of a function; null where the module has none of that name.
+    [[nodiscard]] virtual void* find(const char* symbol) = 0;
+};
+
+class CodeGenerator {
+  public:
+    /// @param lanes  for which the image functions are taken
+    static Expected<std::unique_ptr<CodeGenerator>> create(std::uint32_t lanes, bool contract);
+    virtual ~CodeGenerator() = default;
+
+    /// Gives a new module the data layout and target of this machine.
+    virtual void prepare(llvm::Module& module) = 0;
+    /// Optimizes and translates. The bytes are an object file for `load`.
+    virtual Expected<std::vector<std::byte>> compile(llvm::Module& module, const std::string& name, bool has_coroutines) = 0;
+    /// Puts an object file that `compile` made, in this run or an earlier one on an equal machine, into memory.
+    virtual Expected<std::shared_ptr<LoadedCode>> load(std::vector<std::byte> object, const std::string& name) = 0;
+    /// Whatever the translation depends on besides the module: processor, features, versions.
+    [[nodiscard]] virtual const std::string& fingerprint() const = 0;
+    /// The processor converts half precision by instructions.
+    [[nodiscard]] virtual bool has_half_instructions() const = 0;
+};
+
+}  // namespace nacre::cpu

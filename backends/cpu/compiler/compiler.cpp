@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backends/cpu/compiler/compiler.h"
+
+#include <cstdlib>
+#include <cstring>
+
+#include <fmt/format.h>
+#include <llvm/IR/LLVMContext.h>
+#include <llvm/Support/raw_ostream.h>
+
+#include "backends/cpu/compiler/code.h"
+#include "backends/cpu/compiler/legalization.h"
+#include "backends/cpu/compiler/module.h"
+#include "backends/cpu/compiler/stages.h"
+#include "core/disk_cache.h"
+#include "rhi/spirv.h"
+
+namespace nacre::cpu {
+namespace {
+
+/// Raised whenever the code that is made for the same module changes.
+constexpr std::uint32_t compiler_revision = 1;
+
+class ShaderCompilation final : public Compiler {
+  public:
+    ShaderCompilation(const CompilerOptions& options, std::unique_ptr<CodeGenerator> generator)
+        : options_(options), generator_(std::move(generator)) {}
+
+    Expected<ComputeProgram> compile_compute(const ShaderSource& source) override {
+        ComputeProgram program;
+        program.name = std::string(source.name);
+        std::uint64_t workgroup_bytes = 0;
+        std::uint32_t subgroups = 1;
+        bool has_barriers = false;
+        NACRE_TRY(program.code, compile(source, spv::ExecutionModel::GLCompute, {}, [&](llvm::Module& target, const Module& module) {
+                      ComputeEmitter emitter(target, module, options_, source.slots);
+                      emitter.emit();
+                      program.workgroup_size = module.workgroup_size;
+                      workgroup_bytes = emitter.workgroup_bytes, subgroups = emitter.subgroups, has_barriers = emitter.has_barriers;
+                      return has_barriers;
+                  }));
+        auto& code = static_cast<LoadedCode&>(*program.code);
+        program.run = reinterpret_cast<ComputeFunction>(code.find("kernel"));
+        if (!program.run) return missing(source);
+        program.workgroup_bytes = (workgroup_bytes + 63) / 64 * 64;
+        if (has_barriers) {
+            const auto frame_size = reinterpret_cast<void (*)(std::uint64_t*)>(code.find("frame_size"));
+            if (!frame_size) return missing(source);
+            std::uint64_t bytes = 0;
+            frame_size(&bytes);
+            program.workgroup_bytes += (bytes + 63) / 64 * 64 * subgroups;
+        }
+        return program;
+    }
+
+    Expected<VertexProgram> compile_vertex(const ShaderSource& source, const VertexInput& input) override {
+        VertexProgram program;
+        std::shared_ptr<CompiledCode> code;
+        NACRE_TRY(code, compile(source, spv::ExecutionModel::Vertex, input, [&](llvm::Module& target, const Module& module) {
+                      VertexEmitter emitter(target, module, options_, source.slots, input);
+                      emitter.emit();
+                      program = emitter.program;
+                      return false;
+                  }));
+        program.name = std::string(source.name);
+        program.run = reinterpret_cast<VertexFunction>(static_cast<LoadedCode&>(*code).find("kernel"));
+        program.code = std::move(code);
+        if (!program.run) return missing(source);
+        return program;
+    }
+
+    Expected<FragmentProgram> compile_fragment(const ShaderSource& source) override {
+        FragmentProgram program;
+        std::shared_ptr<CompiledCode> code;
+        NACRE_TRY(code, compile(source, spv::ExecutionModel::Fragment, {}, [&](llvm::Module& target, const Module& module) {
+                      FragmentEmitter emitter(target, module, options_, source.slots);
+                      emitter.emit();
+                      program = emitter.program;
+                      return false;
+                  }));
+        program.name = std::string(source.name);
+        program.run = reinterpret_cast<FragmentFunction>(static_cast<LoadedCode&>(*code).find("kernel"));
+        program.code = std::move(code);
+        if (!program.run) return missing(source);
+        return program;
+    }
+
+  private:
+    static std::unexpected<Error> missing(const ShaderSource& source) {
+        return fail(ErrorCode::internal, "compile shader", fmt::format("'{}'", source.name), "the code that was made has no entry",
+                    "Purge the cache (nacre cache --purge) and try again.");
+    }
+
+    /// Runs `emit` on a new LLVM module and makes code of it; `emit` tells whether it has coroutines.
+    template <typename Emit>
+    Expected<std::shared_ptr<CompiledCode>> compile(const ShaderSource& source, spv::ExecutionModel model, const VertexInput& input, Emit&& emit) {
+        NACRE_TRY(const std::vector<std::uint32_t> words, legalize(source.spirv, source.specialization, source.name));
+        NACRE_TRY(const Module module, Module::parse(words, source.entry_point, model, source.name));
+        llvm::LLVMContext context;
+        auto target = std::make_unique<llvm::Module>("shader", context);
+        generator_->prepare(*target);
+        bool has_coroutines = false;
+        try {
+            has_coroutines = emit(*target, module);
+        } catch (const EmitError& error) {
+            const std::string line = rhi::spirv::source_line(words, error.offset);
+            return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", source.name),
+                        fmt::format("{}{}", error.reason, line.empty() ? std::string() : " (" + line + ")"),
+                        "Write it another way for the CPU backend, or use another backend.");
+        } catch (const std::out_of_range&) {
+            return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", source.name),
+                        "the module refers to something in a way that the CPU backend does not know", "Use another backend.");
+        }
+        if (const char* dump = std::getenv("NACRE_CPU_DUMP")) {
+            std::error_code problem;
+            std::string file(source.name);
+            for (char& letter : file)
+                if (letter == '/' || letter == ' ') letter = '_';
+            llvm::raw_fd_ostream out(fmt::format("{}/{}.ll", dump, file), problem);
+            if (!problem) target->print(out, nullptr);
+        }
+        const Hash128 key = key_of(words, source, model, input);
+        std::vector<std::byte> object;
+        if (options_.use_disk_cache)
+            if (auto found = cache_.load("cpu", key)) object = std::move(*found);
+        if (object.empty()) {
+            NACRE_TRY(object, generator_->compile(*target, std::string(source.name), has_coroutines));
+            if (options_.use_disk_cache) cache_.store("cpu", key, object);
+        }
+        NACRE_TRY(std::shared_ptr<LoadedCode> code, generator_->load(std::move(object), std::string(source.name)));
+        return std::shared_ptr<CompiledCode>(std::move(code));
+    }
+
+    Hash128 key_of(std::span<const std::uint32_t> words, const ShaderSource& source, spv::ExecutionModel model, const VertexInput& input) const {
+        std::string text = fmt::format("{} {} {} {} {} {} {}\n", compiler_revision, options_.lanes, static_cast<int>(options_.mode),
+                                       static_cast<int>(model), source.entry_point, generator_->fingerprint(), words.size());
+        for (const BindingSlots& slot : source.slots) text += fmt::format("s{} {} {} {}\n", slot.set, slot.binding, slot.first, slot.count);
+        for (const rhi::VertexAttribute& at : input.attributes)
+            text += fmt::format("a{} {} {} {}\n", at.location, at.buffer, at.offset, static_cast<int>(at.format));
+        for (const rhi::VertexBufferLayout& at : input.buffers) text += fmt::format("b{} {}\n", at.stride, at.per_instance);
+        text.append(reinterpret_cast<const char*>(words.data()), words.size() * 4);
+        return hash128(std::as_bytes(std::span(text)));
+    }
+
+    CompilerOptions options_;
+    std::unique_ptr<CodeGenerator> generator_;
+    DiskCache cache_;
+};
+
+}  // namespace
+
+Expected<std::unique_ptr<Compiler>> Compiler::create(const CompilerOptions& options) {
+    if (options.lanes != 4 && options.lanes != 8 && options.lanes != 16)
+        return fail(ErrorCode::invalid_argument, "make CPU compiler", fmt::format("lanes={}", options.lanes), "lanes are 4, 8 or 16", "Choose one of them.");
+    NACRE_TRY(std::unique_ptr<CodeGenerator> generator, CodeGenerator::create(options.lanes, options.mode == ExecutionMode::fast));
+    return std::make_unique<ShaderCompilation>(options, std::move(generator));
+}
+
+std::uint32_t native_lanes() {
+#if defined(__x86_64__)
+    return __builtin_cpu_supports("avx2") ? 16 : 4;
+#else
+    return 4;
+#endif
+}
+
+}  // namespace nacre::cpu

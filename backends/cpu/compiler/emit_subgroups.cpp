@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <llvm/IR/Constants.h>
+#include <llvm/IR/Intrinsics.h>
+
+#include "backends/cpu/compiler/emitter.h"
+
+namespace nacre::cpu {
+
+using spv::Op;
+
+namespace {
+
+/// How two values of a reduction become one, and the value that changes nothing.
+struct Combination {
+    std::function<llvm::Value*(llvm::Value*, llvm::Value*)> combine;
+    llvm::Constant* identity = nullptr;
+};
+
+}  // namespace
+
+llvm::Value* Emitter::permute(llvm::Value* values, llvm::Value* sources) {
+    // Through memory: LLVM has no shuffle by a variable that all targets take.
+    llvm::Type* scalar = values->getType()->getScalarType();
+    const bool is_boolean = scalar->isIntegerTy(1);
+    if (is_boolean) {
+        scalar = builder.getInt32Ty();
+        values = builder.CreateZExt(values, vector_of(scalar));
+    }
+    llvm::AllocaInst* memory = make_slot(vector_of(scalar), "permuted");
+    builder.CreateStore(values, memory);
+    llvm::Value* inside = builder.CreateAnd(sources, splat(int32(lanes - 1)));
+    llvm::Value* places = builder.CreateGEP(scalar, memory, inside);
+    const llvm::Align alignment(std::max(1u, scalar->getScalarSizeInBits() / 8));
+    llvm::Value* result = builder.CreateMaskedGather(vector_of(scalar), places, alignment, all_lanes(),
+                                                     llvm::Constant::getNullValue(vector_of(scalar)));
+    return is_boolean ? builder.CreateICmpNE(result, llvm::Constant::getNullValue(result->getType())) : result;
+}
+
+bool Emitter::emit_subgroup(const Instruction& at) {
+    const auto operand_value = [&](std::size_t i) { return get(at.operand(i)); };
+    const auto word_type = [&]() -> llvm::Type* { return builder.getInt32Ty(); };
+    // A ballot is four words; only the first has lanes.
+    const auto ballot = [&](llvm::Value* lanes_on) {
+        return std::vector<Component>{Component(mask_bits(lanes_on)), Component(int32(0)), Component(int32(0)), Component(int32(0))};
+    };
+    const auto condition_mask = [&](const Component& condition) { return both(mask, condition.value); };
+    const auto lane_bit = [&](llvm::Value* word) {  // i1 of each lane from a scalar word of bits.
+        return builder.CreateBitCast(builder.CreateTrunc(word, builder.getIntNTy(lanes)), mask_type);
+    };
+    const auto one_lane = [&](const Component& value, llvm::Value* lane) -> Component {
+        if (value.is_uniform()) return value;
+        llvm::Value* inside = builder.CreateAnd(builder.CreateZExtOrTrunc(lane, word_type()), int32(lanes - 1));
+        return Component(builder.CreateExtractElement(value.value, inside));
+    };
+
+    switch (at.op) {
+        case Op::OpGroupNonUniformElect: {
+            llvm::Value* lowest = first_lane(mask);
+            set(at, {Component(both(mask, builder.CreateICmpEQ(lane_numbers(), splat(lowest))))});
+            return true;
+        }
+        case Op::OpGroupNonUniformAll: case Op::OpSubgroupAllKHR: {
+            const Component condition = get_scalar(at.operand(at.op == Op::OpSubgroupAllKHR ? 0 : 1));
+            if (condition.is_uniform()) set(at, {condition});
+            else set(at, {Component(builder.CreateNot(any(both(mask, builder.CreateNot(condition.value)))))});
+            return true;
+        }
+        case Op::OpGroupNonUniformAny: case Op::OpSubgroupAnyKHR: {
+            const Component condition = get_scalar(at.operand(at.op == Op::OpSubgroupAnyKHR ? 0 : 1));
+            if (condition.is_uniform()) set(at, {condition});
+            else set(at, {Component(any(condition_mask(condition)))});
+            return true;
+        }
+        case Op::OpGroupNonUniformAllEqual: case Op::OpSubgroupAllEqualKHR: {
+            const Value value = operand_value(at.op == Op::OpSubgroupAllEqualKHR ? 0 : 1);
+            llvm::Value* equal = builder.getTrue();
+            for (const Component& component : value.components) {
+                if (component.is_uniform()) continue;
+                llvm::Value* first = splat(narrow(component, mask));
+                llvm::Value* same = first->getType()->isFPOrFPVectorTy() ? builder.CreateFCmpOEQ(component.value, first)
+                                                                         : builder.CreateICmpEQ(component.value, first);
+                equal = builder.CreateAnd(equal, builder.CreateNot(any(both(mask, builder.CreateNot(same)))));
+            }
+            set(at, {Component(equal)});
+            return true;
+        }
+        case Op::OpGroupNonUniformBroadcastFirst: case Op::OpSubgroupFirstInvocationKHR: {
+            std::vector<Component> made;
+            for (const Component& component : operand_value(at.op == Op::OpSubgroupFirstInvocationKHR ? 0 : 1).components)
+                made.emplace_back(narrow(component, mask));
+            set(at, std::move(made));
+            return true;
+        }
+        case Op::OpGroupNonUniformBroadcast: case Op::OpSubgroupReadInvocationKHR: {
+            const std::size_t first = at.op == Op::OpSubgroupReadInvocationKHR ? 0 : 1;
+            llvm::Value* lane = narrow(get_scalar(at.operand(first + 1)), mask);
+            std::vector<Component> made;
+            for (const Component& component : operand_value(first).components) made.push_back(one_lane(component, lane));
+            set(at, std::move(made));
+            return true;
+        }
+        case Op::OpGroupNonUniformBallot: case Op::OpSubgroupBallotKHR: {
+            const Component condition = get_scalar(at.operand(at.op == Op::OpSubgroupBallotKHR ? 0 : 1));
+            set(at, ballot(condition_mask(condition)));
+            return true;
+        }
+        case Op::OpGroupNonUniformInverseBallot: {
+            set(at, {Component(lane_bit(narrow(operand_value(1).components.at(0), mask)))});
+            return true;
+        }
+        case Op::OpGroupNonUniformBallotBitExtract: {
+            const Component word = operand_value(1).components.at(0), index = get_scalar(at.operand(2));
+            set(at, {apply({word, index}, [&](auto v) {
+                    llvm::Value* shifted = builder.CreateLShr(v[0], builder.CreateAnd(v[1], llvm::ConstantInt::get(v[1]->getType(), 31)));
+                    return builder.CreateTrunc(shifted, v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(mask_type) : builder.getInt1Ty());
+                })});
+            return true;
+        }
+        case Op::OpGroupNonUniformBallotBitCount: {
+            const auto operation = static_cast<spv::GroupOperation>(at.operand(1));
+            llvm::Value* used = int32(static_cast<std::int64_t>((std::uint64_t{1} << lanes) - 1));
+            Component word = apply({operand_value(2).components.at(0)}, [&](auto v) {
+                return builder.CreateAnd(v[0], v[0]->getType()->isVectorTy() ? splat(used) : used);
+            });
+            if (operation != spv::GroupOperation::Reduce) {
+                std::vector<std::uint32_t> below(lanes);
+                for (std::uint32_t i = 0; i < lanes; ++i)
+                    below[i] = operation == spv::GroupOperation::InclusiveScan ? (2u << i) - 1 : (1u << i) - 1;
+                word = Component(builder.CreateAnd(widen(word), llvm::ConstantDataVector::get(context, below)));
+            }
+            set(at, {apply({word}, [&](auto v) { return math.bit_count(v[0]); })});
+            return true;
+        }
+        case Op::OpGroupNonUniformBallotFindLSB: case Op::OpGroupNonUniformBallotFindMSB: {
+            set(at, {apply({operand_value(1).components.at(0)}, [&](auto v) {
+                    return at.op == Op::OpGroupNonUniformBallotFindLSB ? math.find_lsb(v[0]) : math.find_u_msb(v[0]);
+                })});
+            return true;
+        }
+        case Op::OpGroupNonUniformShuffle: case Op::OpGroupNonUniformShuffleXor: case Op::OpGroupNonUniformShuffleUp:
+        case Op::OpGroupNonUniformShuffleDown: case Op::OpGroupNonUniformQuadBroadcast: case Op::OpGroupNonUniformQuadSwap: {
+            llvm::Value* operand = nullptr;
+            if (at.op != Op::OpGroupNonUniformQuadSwap || !module.constant_word(at.operand(2)))
+                operand = builder.CreateZExtOrTrunc(widen(get_scalar(at.operand(2))), vector_of(word_type()));
+            else
+                operand = splat(int32(static_cast<std::int64_t>(*module.constant_word(at.operand(2)))));
+            llvm::Value* numbers = lane_numbers();
+            llvm::Value* source = operand;
+            switch (at.op) {
+                case Op::OpGroupNonUniformShuffleXor: source = builder.CreateXor(numbers, operand); break;
+                case Op::OpGroupNonUniformShuffleUp: source = builder.CreateSub(numbers, operand); break;
+                case Op::OpGroupNonUniformShuffleDown: source = builder.CreateAdd(numbers, operand); break;
+                case Op::OpGroupNonUniformQuadBroadcast:
+                    source = builder.CreateOr(builder.CreateAnd(numbers, splat(int32(~3))), builder.CreateAnd(operand, splat(int32(3))));
+                    break;
+                case Op::OpGroupNonUniformQuadSwap:
+                    // Horizontal 0, vertical 1, diagonal 2: the lane number with bit 0, bit 1 or both turned over.
+                    source = builder.CreateXor(numbers, builder.CreateAnd(builder.CreateAdd(operand, splat(int32(1))), splat(int32(3))));
+                    break;
+                default: break;
+            }
+            std::vector<Component> made;
+            for (const Component& component : operand_value(1).components)
+                made.push_back(component.is_uniform() ? Component(widen(component)) : Component(permute(component.value, source)));
+            set(at, std::move(made));
+            return true;
+        }
+        default: break;
+    }
+
+    // Reductions and scans.
+    const Type& scalar = module.has_type(at.type) && module.type(at.type).components > 0 ? module.type(component_type(at.type, 0)) : Type{};
+    Combination how;
+    llvm::Type* kind = scalar.is_scalar() && scalar.bits ? scalar_type(scalar) : nullptr;
+    const auto integer = [&](std::uint64_t value) { return llvm::ConstantInt::get(kind, value); };
+    switch (at.op) {
+        case Op::OpGroupNonUniformIAdd: how = {[&](auto* a, auto* b) { return builder.CreateAdd(a, b); }, integer(0)}; break;
+        case Op::OpGroupNonUniformFAdd: how = {[&](auto* a, auto* b) { return builder.CreateFAdd(a, b); }, llvm::ConstantFP::get(kind, -0.0)}; break;
+        case Op::OpGroupNonUniformIMul: how = {[&](auto* a, auto* b) { return builder.CreateMul(a, b); }, integer(1)}; break;
+        case Op::OpGroupNonUniformFMul: how = {[&](auto* a, auto* b) { return builder.CreateFMul(a, b); }, llvm::ConstantFP::get(kind, 1.0)}; break;
+        case Op::OpGroupNonUniformSMin: how = {[&](auto* a, auto* b) { return math.s_min(a, b); }, integer((std::uint64_t{1} << (scalar.bits - 1)) - 1)}; break;
+        case Op::OpGroupNonUniformUMin: how = {[&](auto* a, auto* b) { return math.u_min(a, b); }, integer(~std::uint64_t{0})}; break;
+        case Op::OpGroupNonUniformFMin: how = {[&](auto* a, auto* b) { return math.n_min(a, b); }, llvm::ConstantFP::getInfinity(kind)}; break;
+        case Op::OpGroupNonUniformSMax: how = {[&](auto* a, auto* b) { return math.s_max(a, b); }, integer(std::uint64_t{1} << (scalar.bits - 1))}; break;
+        case Op::OpGroupNonUniformUMax: how = {[&](auto* a, auto* b) { return math.u_max(a, b); }, integer(0)}; break;
+        case Op::OpGroupNonUniformFMax: how = {[&](auto* a, auto* b) { return math.n_max(a, b); }, llvm::ConstantFP::getInfinity(kind, true)}; break;
+        case Op::OpGroupNonUniformBitwiseAnd: case Op::OpGroupNonUniformLogicalAnd:
+            how = {[&](auto* a, auto* b) { return builder.CreateAnd(a, b); }, llvm::Constant::getAllOnesValue(kind)}; break;
+        case Op::OpGroupNonUniformBitwiseOr: case Op::OpGroupNonUniformLogicalOr:
+            how = {[&](auto* a, auto* b) { return builder.CreateOr(a, b); }, llvm::Constant::getNullValue(kind)}; break;
+        case Op::OpGroupNonUniformBitwiseXor: case Op::OpGroupNonUniformLogicalXor:
+            how = {[&](auto* a, auto* b) { return builder.CreateXor(a, b); }, llvm::Constant::getNullValue(kind)}; break;
+        default: return false;
+    }
+    const auto operation = static_cast<spv::GroupOperation>(at.operand(1));
+    std::uint32_t cluster = lanes;
+    if (operation == spv::GroupOperation::ClusteredReduce)
+        cluster = std::min(lanes, std::max(1u, module.constant_word(at.operand(3)).value_or(lanes)));
+    std::vector<Component> made;
+    for (const Component& component : operand_value(2).components) {
+        llvm::Value* identity = splat(how.identity);
+        llvm::Value* values = select(mask, widen(component), identity);
+        const auto moved_by = [&](llvm::Value* from, std::int32_t distance, bool exchange) {
+            // Lanes from `distance` below (or exchanged with it); the identity where there is none.
+            llvm::SmallVector<int, 16> source(lanes);
+            for (std::uint32_t i = 0; i < lanes; ++i) {
+                const std::int32_t lane = static_cast<std::int32_t>(i);
+                source[i] = exchange ? lane ^ distance : lane >= distance ? lane - distance : static_cast<std::int32_t>(lanes);
+            }
+            return builder.CreateShuffleVector(from, identity, source);
+        };
+        if (operation == spv::GroupOperation::InclusiveScan || operation == spv::GroupOperation::ExclusiveScan) {
+            for (std::uint32_t step = 1; step < lanes; step *= 2)
+                values = how.combine(moved_by(values, static_cast<std::int32_t>(step), false), values);
+            if (operation == spv::GroupOperation::ExclusiveScan) values = moved_by(values, 1, false);
+            made.emplace_back(values);
+        } else {
+            for (std::uint32_t step = 1; step < cluster; step *= 2)
+                values = how.combine(values, moved_by(values, static_cast<std::int32_t>(step), true));
+            made.push_back(operation == spv::GroupOperation::Reduce ? Component(builder.CreateExtractElement(values, std::uint64_t{0}))
+                                                                    : Component(values));
+        }
+    }
+    set(at, std::move(made));
+    return true;
+}
+
+}  // namespace nacre::cpu

@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <llvm/IR/Constants.h>
+#include <spirv/unified1/GLSL.std.450.h>
+
+#include "backends/cpu/compiler/stage_interface.h"
+#include "backends/cpu/compiler/stages.h"
+
+namespace nacre::cpu {
+
+using spv::BuiltIn;
+using spv::Op;
+
+namespace {
+
+/// Four samples of the standard pattern, in pixels (Vulkan specification, "Standard Sample Locations").
+constexpr std::array<std::array<float, 2>, 4> sample_places{{{0.375f, 0.125f}, {0.875f, 0.375f}, {0.125f, 0.625f}, {0.625f, 0.875f}}};
+
+}  // namespace
+
+/// Four floats at an offset in each quad's primitive, each spread over the quad: element `part` for every lane.
+Component FragmentEmitter::primitive_word(std::size_t offset, llvm::Type* type) {
+    const std::uint32_t quads = lanes / 4;
+    const std::size_t aligned = offset / 16 * 16;
+    const int part = static_cast<int>(offset % 16 / 4);
+    auto* four = llvm::FixedVectorType::get(builder.getFloatTy(), 4);
+    std::vector<llvm::Value*> parts;
+    for (std::uint32_t q = 0; q < quads; ++q)
+        parts.push_back(invariant_load(four, at_offset(primitives[q], static_cast<std::int64_t>(aligned)), 16));
+    // Two by two until one vector holds all; then each quad takes its element.
+    while (parts.size() > 1) {
+        std::vector<llvm::Value*> joined;
+        for (std::size_t i = 0; i + 1 < parts.size(); i += 2) {
+            const int length = static_cast<int>(llvm::cast<llvm::FixedVectorType>(parts[i]->getType())->getNumElements());
+            llvm::SmallVector<int, 16> all(static_cast<std::size_t>(2 * length));
+            for (int k = 0; k < 2 * length; ++k) all[static_cast<std::size_t>(k)] = k;
+            joined.push_back(builder.CreateShuffleVector(parts[i], parts[i + 1], all));
+        }
+        parts = std::move(joined);
+    }
+    llvm::SmallVector<int, 16> spread(lanes);
+    for (std::uint32_t i = 0; i < lanes; ++i) spread[i] = static_cast<int>(i / 4 * 4) + part;
+    llvm::Value* value = builder.CreateShuffleVector(parts[0], spread);
+    return Component(type->isFloatTy() ? value : builder.CreateBitCast(value, vector_of(type)));
+}
+
+Component FragmentEmitter::evaluate_plane(std::size_t offset, const Place& place) {
+    llvm::Value* c = primitive_word(offset + offsetof(Plane, c), builder.getFloatTy()).value;
+    llvm::Value* dx = primitive_word(offset + offsetof(Plane, dx), builder.getFloatTy()).value;
+    llvm::Value* dy = primitive_word(offset + offsetof(Plane, dy), builder.getFloatTy()).value;
+    llvm::Value* x = builder.CreateFSub(place.x, primitive_word(offsetof(PrimitiveData, x0), builder.getFloatTy()).value);
+    llvm::Value* y = builder.CreateFSub(place.y, primitive_word(offsetof(PrimitiveData, y0), builder.getFloatTy()).value);
+    return Component(builder.CreateFAdd(builder.CreateFAdd(c, builder.CreateFMul(dx, x)), builder.CreateFMul(dy, y)));
+}
+
+Component FragmentEmitter::evaluate_input(std::uint32_t index, const Place& place, const Type& scalar) {
+    const std::size_t offset = sizeof(PrimitiveData) + index * sizeof(Plane);
+    const FragmentInput& input = program.inputs[index];
+    if (input.interpolation == Interpolation::flat) return from_word(primitive_word(offset, builder.getInt32Ty()), scalar_type(scalar));
+    Component value = evaluate_plane(offset, place);
+    if (input.interpolation == Interpolation::perspective) {
+        llvm::Value* inverse = evaluate_plane(offsetof(PrimitiveData, inverse_w), place).value;
+        llvm::Value* one = llvm::ConstantFP::get(inverse->getType(), 1);
+        value = Component(builder.CreateFMul(value.value, builder.CreateFDiv(one, inverse)));
+    }
+    return scalar.bits == 32 ? value : Component(math.convert_float(value.value, scalar_type(scalar)));
+}
+
+FragmentEmitter::Place FragmentEmitter::place_at(llvm::Value* inside_x, llvm::Value* inside_y) {
+    return {builder.CreateFAdd(pixel_x, inside_x), builder.CreateFAdd(pixel_y, inside_y)};
+}
+
+void FragmentEmitter::declare_inputs() {
+    for (const Id id : module.interface()) {
+        const Variable* variable = module.variable(id);
+        if (!variable || variable->storage != spv::StorageClass::Input) continue;
+        if (variable->builtin) {
+            if (*variable->builtin == BuiltIn::SampleId || *variable->builtin == BuiltIn::SamplePosition) program.runs_per_sample = true;
+            continue;
+        }
+        const Type& type = module.type(variable->type);
+        if (type.kind == TypeKind::structure && !type.members.empty() && type.members[0].builtin) continue;
+        const auto scalars = interface_scalars(module, *variable);
+        if (!scalars) {
+            current = &variable->instruction;
+            reject(fmt::format("input '{}' has no location, or holds 64-bit values", variable->name));
+        }
+        std::vector<std::uint32_t>& numbers = input_numbers_[id];
+        for (const InterfaceScalar& at : *scalars) {
+            FragmentInput input;
+            input.location = at.location, input.component = at.component;
+            const bool is_flat = at.flat || module.type(at.type).kind != TypeKind::floating;
+            input.interpolation = is_flat ? Interpolation::flat : at.no_perspective ? Interpolation::linear : Interpolation::perspective;
+            program.runs_per_sample = program.runs_per_sample || (at.sample && !is_flat);
+            program.uses_centroid = program.uses_centroid || (at.centroid && !is_flat);
+            numbers.push_back(static_cast<std::uint32_t>(program.inputs.size()));
+            program.inputs.push_back(input);
+        }
+    }
+    for (const auto& [id, function] : module.functions())
+        for (const Block& block : function.blocks) {
+            if (block.terminator.op == Op::OpKill || block.terminator.op == Op::OpTerminateInvocation) program.discards = true;
+            for (const Instruction& at : block.body) {
+                if (at.op == Op::OpDemoteToHelperInvocation) program.discards = true;
+                if (at.op == Op::OpExtInst && module.is_glsl_set(at.operand(0)) && at.operand(1) == GLSLstd450InterpolateAtCentroid)
+                    program.uses_centroid = true;
+            }
+        }
+}
+
+std::vector<Component> FragmentEmitter::input_components(const Variable& variable) {
+    const auto float_word = [&](std::size_t offset) -> llvm::Value* {
+        return builder.CreateAlignedLoad(builder.getFloatTy(), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4));
+    };
+    if (variable.builtin) {
+        switch (*variable.builtin) {
+            case BuiltIn::FragCoord:
+                return {Component(center.x), Component(center.y), evaluate_plane(offsetof(PrimitiveData, depth), center),
+                        evaluate_plane(offsetof(PrimitiveData, inverse_w), center)};
+            case BuiltIn::FrontFacing: {
+                llvm::Value* word = primitive_word(offsetof(PrimitiveData, front_facing), builder.getInt32Ty()).value;
+                return {Component(builder.CreateICmpNE(word, llvm::Constant::getNullValue(word->getType())))};
+            }
+            case BuiltIn::PrimitiveId: return {primitive_word(offsetof(PrimitiveData, primitive_id), builder.getInt32Ty())};
+            case BuiltIn::Layer: return {primitive_word(offsetof(PrimitiveData, layer), builder.getInt32Ty())};
+            case BuiltIn::ViewIndex:
+            case BuiltIn::ViewportIndex:
+            case BuiltIn::DeviceIndex: return {Component(int32(0))};
+            case BuiltIn::PointCoord: {
+                llvm::Value* scale = primitive_word(offsetof(PrimitiveData, inverse_point_size), builder.getFloatTy()).value;
+                llvm::Value* left = primitive_word(offsetof(PrimitiveData, point_x), builder.getFloatTy()).value;
+                llvm::Value* top = primitive_word(offsetof(PrimitiveData, point_y), builder.getFloatTy()).value;
+                return {Component(builder.CreateFMul(builder.CreateFSub(center.x, left), scale)),
+                        Component(builder.CreateFMul(builder.CreateFSub(center.y, top), scale))};
+            }
+            case BuiltIn::SampleId:
+                return {Component(builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, sample_index)), llvm::Align(4)))};
+            case BuiltIn::SamplePosition:
+                return {Component(float_word(offsetof(FragmentBatch, sample_x))), Component(float_word(offsetof(FragmentBatch, sample_y)))};
+            case BuiltIn::SampleMask: {
+                std::vector<Component> made(module.type(variable.type).components, Component(int32(0)));
+                made[0] = Component(builder.CreateAlignedLoad(vector_of(builder.getInt32Ty()), at_offset(batch, offsetof(FragmentBatch, sample_mask_in)), llvm::Align(64)));
+                return made;
+            }
+            case BuiltIn::HelperInvocation: return {Component(builder.CreateNot(live()))};
+            default: reject("a built-in input is not supported in fragment shaders");
+        }
+    }
+    const auto scalars = interface_scalars(module, variable);
+    const auto numbers = input_numbers_.find(variable.instruction.result);
+    if (!scalars || numbers == input_numbers_.end()) reject(fmt::format("input '{}' is not supported in fragment shaders", variable.name));
+    std::vector<Component> made;
+    for (std::size_t i = 0; i < scalars->size(); ++i) {
+        const InterfaceScalar& at = (*scalars)[i];
+        made.push_back(evaluate_input(numbers->second[i], at.centroid && !program.runs_per_sample ? centroid : center, module.type(at.type)));
+    }
+    return made;
+}
+
+Component FragmentEmitter::difference(const Component& value, bool vertical, bool is_fine) {
+    if (value.is_uniform()) return Component(llvm::Constant::getNullValue(value.value->getType()));
+    llvm::SmallVector<int, 16> low(lanes), high(lanes);
+    for (std::uint32_t i = 0; i < lanes; ++i) {
+        const std::uint32_t quad = i / 4 * 4;
+        const std::uint32_t first = vertical ? quad + (is_fine ? i & 1 : 0) : quad + (is_fine ? i & 2 : 0);
+        low[i] = static_cast<int>(first);
+        high[i] = static_cast<int>(first + (vertical ? 2 : 1));
+    }
+    return Component(builder.CreateFSub(builder.CreateShuffleVector(value.value, high), builder.CreateShuffleVector(value.value, low)));
+}
+
+bool FragmentEmitter::emit_stage(const Instruction& at) {
+    bool both_ways = false, vertical = false, is_fine = true;
+    switch (at.op) {
+        case Op::OpDPdx: case Op::OpDPdxFine: break;
+        case Op::OpDPdxCoarse: is_fine = false; break;
+        case Op::OpDPdy: case Op::OpDPdyFine: vertical = true; break;
+        case Op::OpDPdyCoarse: vertical = true, is_fine = false; break;
+        case Op::OpFwidth: case Op::OpFwidthFine: both_ways = true; break;
+        case Op::OpFwidthCoarse: both_ways = true, is_fine = false; break;
+        case Op::OpControlBarrier: reject("barriers belong into compute shaders");
+        case Op::OpExtInst: {
+            if (!module.is_glsl_set(at.operand(0))) return false;
+            const std::uint32_t number = at.operand(1);
+            if (number != GLSLstd450InterpolateAtCentroid && number != GLSLstd450InterpolateAtSample && number != GLSLstd450InterpolateAtOffset)
+                return false;
+            const Pointer pointer = *get(at.operand(2)).pointer;
+            Place place = centroid;
+            if (number == GLSLstd450InterpolateAtOffset) {
+                const Value offset = get(at.operand(3));
+                const auto shifted = [&](const Component& by) {
+                    return builder.CreateFAdd(widen(by), llvm::ConstantFP::get(vector_of(builder.getFloatTy()), 0.5));
+                };
+                place = place_at(shifted(offset.components.at(0)), shifted(offset.components.at(1)));
+            } else if (number == GLSLstd450InterpolateAtSample) {
+                llvm::Value* which = widen(get_scalar(at.operand(3)));
+                llvm::Value *x = nullptr, *y = nullptr;
+                for (std::size_t i = sample_places.size(); i-- > 0;) {
+                    llvm::Value* here_x = llvm::ConstantFP::get(vector_of(builder.getFloatTy()), static_cast<double>(sample_places[i][0]));
+                    llvm::Value* here_y = llvm::ConstantFP::get(vector_of(builder.getFloatTy()), static_cast<double>(sample_places[i][1]));
+                    llvm::Value* is_this = builder.CreateICmpEQ(which, llvm::ConstantInt::get(which->getType(), i));
+                    x = x ? select(is_this, here_x, x) : here_x;
+                    y = y ? select(is_this, here_y, y) : here_y;
+                }
+                place = place_at(x, y);
+            }
+            const auto numbers = input_numbers_.find(pointer.variable_id);
+            if (numbers == input_numbers_.end() || pointer.dynamic_component) reject("interpolation at a place needs an input with a constant index");
+            std::vector<Component> made;
+            std::uint32_t index = pointer.component;
+            for_each_component_type(at.type, [&](const Type& scalar) { made.push_back(evaluate_input(numbers->second.at(index++), place, scalar)); });
+            set(at, std::move(made));
+            return true;
+        }
+        default: return false;
+    }
+    std::vector<Component> made;
+    for (const Component& value : get(at.operand(0)).components) {
+        if (!both_ways) {
+            made.push_back(difference(value, vertical, is_fine));
+            continue;
+        }
+        made.push_back(apply({difference(value, false, is_fine), difference(value, true, is_fine)}, [&](auto v) {
+            return builder.CreateFAdd(math.f_abs(v[0]), math.f_abs(v[1]));
+        }));
+    }
+    set(at, std::move(made));
+    return true;
+}
+
+void FragmentEmitter::store_outputs() {
+    for (const Id id : module.interface()) {
+        const Variable* variable = module.variable(id);
+        if (!variable || variable->storage != spv::StorageClass::Output) continue;
+        const std::vector<Component> values = load(pointer_to(id));
+        if (variable->builtin) {
+            const auto put = [&](std::size_t offset) {
+                builder.CreateAlignedStore(widen(to_word(values.at(0))), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
+            };
+            if (*variable->builtin == BuiltIn::FragDepth) program.writes_depth = true, put(offsetof(FragmentBatch, depth));
+            else if (*variable->builtin == BuiltIn::SampleMask) program.writes_sample_mask = true, put(offsetof(FragmentBatch, sample_mask_out));
+            else reject("a built-in output is not supported in fragment shaders");
+            continue;
+        }
+        const auto scalars = interface_scalars(module, *variable);
+        if (!scalars) reject(fmt::format("output '{}' has no location, or holds 64-bit values", variable->name));
+        for (std::size_t i = 0; i < scalars->size(); ++i) {
+            const InterfaceScalar& at = (*scalars)[i];
+            const std::uint32_t output = variable->index == 1 ? dual_source_output + at.location : at.location;
+            if (output >= max_color_outputs || at.component >= 4) reject("a color output lies behind the last location");
+            const std::size_t offset = offsetof(FragmentBatch, colors) + (output * 4 + at.component) * max_lanes * 4;
+            builder.CreateAlignedStore(widen(to_word(values[i])), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
+            auto found = std::ranges::find(program.outputs, output, &FragmentOutput::output);
+            if (found == program.outputs.end()) program.outputs.push_back({output, at.component + 1});
+            else found->components = std::max(found->components, at.component + 1);
+        }
+    }
+    builder.CreateAlignedStore(mask_bits(live()), at_offset(batch, offsetof(FragmentBatch, live)), llvm::Align(4));
+}
+
+void FragmentEmitter::emit() {
+    auto* type = llvm::FunctionType::get(builder.getVoidTy(), {pointer_type, pointer_type, builder.getInt32Ty()}, false);
+    function_ = llvm::Function::Create(type, llvm::Function::ExternalLinkage, "kernel", target);
+    shader_context = function_->getArg(0);
+    slot_block = llvm::BasicBlock::Create(context, "slots", function_);
+    llvm::BasicBlock* start = llvm::BasicBlock::Create(context, "start", function_);
+    llvm::BasicBlock* loop = llvm::BasicBlock::Create(context, "batch", function_);
+    llvm::BasicBlock* done = llvm::BasicBlock::Create(context, "done", function_);
+    builder.SetInsertPoint(start);
+    builder.CreateCondBr(builder.CreateICmpNE(function_->getArg(2), int32(0)), loop, done);
+    builder.SetInsertPoint(loop);
+    llvm::PHINode* number = builder.CreatePHI(builder.getInt32Ty(), 2, "batch");
+    number->addIncoming(int32(0), start);
+    batch = builder.CreateGEP(builder.getInt8Ty(), function_->getArg(1),
+                              builder.CreateMul(builder.CreateZExt(number, builder.getInt64Ty()), int64(sizeof(FragmentBatch))));
+    const std::uint32_t quads = lanes / 4;
+    for (std::uint32_t q = 0; q < quads; ++q)
+        primitives[q] = builder.CreateAlignedLoad(pointer_type, at_offset(batch, static_cast<std::int64_t>(offsetof(FragmentBatch, primitives) + q * 8)), llvm::Align(8));
+    llvm::SmallVector<int, 16> quad_of_lane(lanes);
+    for (std::uint32_t i = 0; i < lanes; ++i) quad_of_lane[i] = static_cast<int>(i / 4);
+    const auto corner = [&](std::size_t offset) {
+        auto* each_quad = llvm::FixedVectorType::get(builder.getInt32Ty(), quads);
+        llvm::Value* corners = builder.CreateAlignedLoad(each_quad, at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4));
+        return builder.CreateShuffleVector(corners, quad_of_lane);
+    };
+    llvm::Value* x = corner(offsetof(FragmentBatch, x));
+    llvm::Value* y = corner(offsetof(FragmentBatch, y));
+    std::vector<std::uint32_t> step_x(lanes), step_y(lanes);
+    for (std::uint32_t i = 0; i < lanes; ++i) step_x[i] = i & 1, step_y[i] = i >> 1 & 1;
+    pixel_x = builder.CreateSIToFP(builder.CreateAdd(x, llvm::ConstantDataVector::get(context, step_x)), vector_of(builder.getFloatTy()));
+    pixel_y = builder.CreateSIToFP(builder.CreateAdd(y, llvm::ConstantDataVector::get(context, step_y)), vector_of(builder.getFloatTy()));
+    declare_inputs();
+    const auto batch_float = [&](std::size_t offset) {
+        return splat(builder.CreateAlignedLoad(builder.getFloatTy(), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4)));
+    };
+    center = place_at(batch_float(offsetof(FragmentBatch, sample_x)), batch_float(offsetof(FragmentBatch, sample_y)));
+    centroid = center;
+    if (program.uses_centroid) {
+        const auto lane_float = [&](std::size_t offset) {
+            return builder.CreateAlignedLoad(vector_of(builder.getFloatTy()), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
+        };
+        centroid = place_at(lane_float(offsetof(FragmentBatch, centroid_x)), lane_float(offsetof(FragmentBatch, centroid_y)));
+    }
+    live_slot = make_slot(mask_type, "live");
+    llvm::Value* live_bits = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, live)), llvm::Align(4));
+    store_live(builder.CreateBitCast(builder.CreateTrunc(live_bits, builder.getIntNTy(lanes)), mask_type));
+    mask = all_lanes();
+    declare_variables();
+    emit_function(module.entry(), {}, all_lanes());
+    mask = all_lanes();
+    store_outputs();
+    llvm::Value* next = builder.CreateAdd(number, int32(1));
+    number->addIncoming(next, builder.GetInsertBlock());
+    builder.CreateCondBr(builder.CreateICmpULT(next, function_->getArg(2)), loop, done);
+    builder.SetInsertPoint(done);
+    builder.CreateRetVoid();
+    builder.SetInsertPoint(slot_block);
+    builder.CreateBr(start);
+    program.early_tests = module.early_fragment_tests;
+    program.has_side_effects = has_side_effects;
+}
+
+}  // namespace nacre::cpu

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backends/cpu/compiler/stage_interface.h"
+
+namespace nacre::cpu {
+namespace {
+
+/// Appends the scalars of a type and returns the location behind them.
+std::uint32_t append(const Module& module, Id type_id, std::uint32_t location, std::uint32_t component, const InterfaceScalar& how,
+                     std::vector<InterfaceScalar>& list) {
+    const Type& type = module.type(type_id);
+    switch (type.kind) {
+        case TypeKind::vector:
+            for (std::uint32_t i = 0; i < type.count; ++i) append(module, type.element, location, component + i, how, list);
+            return location + 1;
+        case TypeKind::matrix:
+        case TypeKind::array:
+            for (std::uint32_t i = 0; i < type.count; ++i) location = append(module, type.element, location, component, how, list);
+            return location;
+        case TypeKind::structure:
+            for (const Member& member : type.members) {
+                InterfaceScalar inner = how;
+                inner.flat |= member.flat, inner.no_perspective |= member.no_perspective;
+                inner.centroid |= member.centroid, inner.sample |= member.sample;
+                location = append(module, member.type, member.location.value_or(location), member.component, inner, list);
+            }
+            return location;
+        default: {
+            InterfaceScalar scalar = how;
+            scalar.location = location, scalar.component = component, scalar.type = type_id;
+            list.push_back(scalar);
+            return location + 1;
+        }
+    }
+}
+
+}  // namespace
+
+std::optional<std::vector<InterfaceScalar>> interface_scalars(const Module& module, const Variable& variable) {
+    const Type& type = module.type(variable.type);
+    if (type.has_wide) return std::nullopt;
+    const bool has_location =
+        variable.location || (type.kind == TypeKind::structure && !type.members.empty() && type.members[0].location);
+    if (!has_location) return std::nullopt;
+    std::vector<InterfaceScalar> list;
+    InterfaceScalar how;
+    how.flat = variable.flat, how.no_perspective = variable.no_perspective;
+    how.centroid = variable.centroid, how.sample = variable.sample;
+    append(module, variable.type, variable.location.value_or(0), variable.component, how, list);
+    return list;
+}
+
+bool uses_member(const Module& module, Id variable, std::uint32_t member) {
+    for (const auto& [id, function] : module.functions())
+        for (const Block& block : function.blocks)
+            for (const Instruction& at : block.body) {
+                if (at.op == spv::Op::OpAccessChain || at.op == spv::Op::OpInBoundsAccessChain) {
+                    if (at.operand(0) == variable && at.operands.size() > 1 && module.constant_word(at.operand(1)) == member) return true;
+                    continue;
+                }
+                for (const std::uint32_t operand : at.operands)
+                    if (operand == variable) return true;
+            }
+    return false;
+}
+
+}  // namespace nacre::cpu

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "backends/cpu/compiler/module.h"
+
+/// @file
+/// Where the scalars of inputs and outputs lie: locations and components, by the rules of the Vulkan specification ("Location
+/// Assignment", "Component Assignment").
+
+namespace nacre::cpu {
+
+struct InterfaceScalar {
+    std::uint32_t location = 0, component = 0;
+    bool flat = false, no_perspective = false, centroid = false, sample = false;
+    Id type = 0;  ///< Scalar type.
+};
+
+/// One entry for each scalar of the variable, in order. Nothing where it holds 64-bit values or has no locations.
+std::optional<std::vector<InterfaceScalar>> interface_scalars(const Module& module, const Variable& variable);
+
+/// Whether code names member `member` of a block of built-in variables; blocks that are used as a whole use every member.
+bool uses_member(const Module& module, Id variable, std::uint32_t member);
+
+}  // namespace nacre::cpu

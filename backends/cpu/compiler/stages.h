@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "backends/cpu/compiler/emitter.h"
+
+/// @file
+/// The three stages: each makes the function that the rest of the backend calls, fills the shader's inputs and takes its
+/// outputs. The result is in the LLVM module; `emit` throws EmitError.
+
+namespace nacre::cpu {
+
+class ComputeEmitter final : public Emitter {
+  public:
+    using Emitter::Emitter;
+    void emit();
+    std::uint64_t workgroup_bytes = 0;  ///< Of workgroup variables; suspended subgroups come behind.
+    std::uint32_t subgroups = 1;        ///< In a workgroup.
+    bool has_barriers = false;          ///< And more than one subgroup: the code suspends.
+
+  private:
+    bool emit_stage(const Instruction& at) override;
+    std::vector<Component> input_components(const Variable& variable) override;
+    llvm::Value* workgroup_memory() override { return memory; }
+    void emit_subgroup_body(llvm::Value* subgroup);
+    void emit_plain_kernel();
+    void emit_suspending_kernel();
+    llvm::Value *range = nullptr, *memory = nullptr, *group_x = nullptr, *subgroup_index = nullptr;
+    std::array<Component, 3> local_id;
+    llvm::BasicBlock *suspend_block = nullptr, *cleanup_block = nullptr;
+};
+
+class VertexEmitter final : public Emitter {
+  public:
+    VertexEmitter(llvm::Module& into, const Module& from, const CompilerOptions& how, std::span<const BindingSlots> layout,
+                  const VertexInput& input)
+        : Emitter(into, from, how, layout), input_(input) {}
+    void emit();
+    VertexProgram program;  ///< Everything but `run`, `name` and `code`.
+    using Emitter::has_side_effects;
+
+  private:
+    std::vector<Component> input_components(const Variable& variable) override;
+    Component fetch(const rhi::VertexAttribute& attribute, std::uint32_t component, const Type& scalar);
+    void store_outputs();
+    const VertexInput& input_;
+    llvm::Value *draw = nullptr, *batch = nullptr, *indices = nullptr, *instance = nullptr;
+};
+
+class FragmentEmitter final : public Emitter {
+  public:
+    using Emitter::Emitter;
+    void emit();
+    FragmentProgram program;  ///< Everything but `run`, `name` and `code`.
+    using Emitter::has_side_effects;
+
+  private:
+    bool emit_stage(const Instruction& at) override;
+    std::vector<Component> input_components(const Variable& variable) override;
+    /// Position inside of the pixel at which planes are evaluated.
+    struct Place {
+        llvm::Value *x = nullptr, *y = nullptr;  ///< Window coordinates of each lane.
+    };
+    Component evaluate_plane(std::size_t offset, const Place& place);  ///< Of the plane at a byte offset in PrimitiveData.
+    Component evaluate_input(std::uint32_t index, const Place& place, const Type& scalar);
+    Component plane_constant(std::size_t offset);
+    Component primitive_word(std::size_t offset, llvm::Type* type);
+    Place place_at(llvm::Value* inside_x, llvm::Value* inside_y);
+    Component difference(const Component& value, bool vertical, bool is_fine);
+    void store_outputs();
+    struct InputLeaf {
+        std::uint32_t first = 0;  ///< Into program.inputs, of the variable's first scalar.
+    };
+    void declare_inputs();
+    llvm::Value* batch = nullptr;
+    std::array<llvm::Value*, max_quads> primitives{};
+    llvm::Value* is_single = nullptr;  ///< i1: all quads are of one primitive.
+    llvm::Value *pixel_x = nullptr, *pixel_y = nullptr;  ///< Float, left upper corner of each lane's pixel.
+    Place center, centroid;
+    llvm::Value* w = nullptr;
+    std::unordered_map<Id, std::vector<std::uint32_t>> input_numbers_;  ///< For each scalar of an input variable.
+};
+
+}  // namespace nacre::cpu

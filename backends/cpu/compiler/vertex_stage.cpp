@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <llvm/IR/Constants.h>
+
+#include "backends/cpu/compiler/stage_interface.h"
+#include "backends/cpu/compiler/stages.h"
+
+namespace nacre::cpu {
+
+using rhi::FormatKind;
+using spv::BuiltIn;
+
+/// One component of an attribute, read from its buffer and converted as its format says.
+Component VertexEmitter::fetch(const rhi::VertexAttribute& attribute, std::uint32_t component, const Type& scalar) {
+    const rhi::FormatInfo& format = rhi::info(attribute.format);
+    const bool is_integer = scalar.kind == TypeKind::integer;
+    llvm::Type* word = builder.getInt32Ty();
+    const auto default_value = [&]() -> Component {
+        const double value = component == 3 ? 1 : 0;
+        if (is_integer) return llvm::ConstantInt::get(scalar_type(scalar), component == 3);
+        return llvm::ConstantFP::get(scalar_type(scalar), value);
+    };
+    if (component >= format.channels) return default_value();
+    const rhi::VertexBufferLayout& layout = input_.buffers[attribute.buffer];
+    const std::size_t binding = offsetof(VertexDraw, buffers) + attribute.buffer * sizeof(VertexBufferBinding);
+    llvm::Value* data = invariant_load(pointer_type, at_offset(draw, static_cast<std::int64_t>(binding + offsetof(VertexBufferBinding, data))), 8);
+    llvm::Value* size = invariant_load(builder.getInt64Ty(), at_offset(draw, static_cast<std::int64_t>(binding + offsetof(VertexBufferBinding, size))), 8);
+
+    // A format's bits as words: which one holds the channel, and where in it.
+    struct Channel {
+        std::uint32_t word, shift, bits;
+    } channel{};
+    const std::uint32_t bytes = format.block_bytes;
+    if (attribute.format == rhi::Format::rgb10a2_unorm || attribute.format == rhi::Format::rgb10a2_uint)
+        channel = {0, component * 10, component == 3 ? 2u : 10u};
+    else if (attribute.format == rhi::Format::rg11b10_float || attribute.format == rhi::Format::rgb9e5_float)
+        reject("vertex attributes with shared or short exponents are not supported");
+    else {
+        const std::uint32_t bits = bytes * 8 / format.channels;
+        channel = {component * bits / 32, component * bits % 32, bits};
+        if (attribute.format == rhi::Format::bgra8_unorm || attribute.format == rhi::Format::bgra8_srgb)
+            channel.shift = component == 3 ? 24 : (2 - component) * 8;
+    }
+    // The element counts as a whole: an attribute that reaches past the buffer's end reads zero. Buffers can be read a
+    // little behind their end, so words need not fit.
+    const bool is_fixed = layout.per_instance || layout.stride == 0;
+    llvm::Value* element = is_fixed ? (layout.stride == 0 ? static_cast<llvm::Value*>(int32(0)) : instance) : indices;
+    const auto widened = [&](llvm::Value* value) {
+        return builder.CreateZExt(value, value->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt64Ty())) : builder.getInt64Ty());
+    };
+    llvm::Value* wide = widened(element);
+    llvm::Type* wide_type = wide->getType();
+    const auto wide_constant = [&](std::uint64_t value) { return llvm::ConstantInt::get(wide_type, value); };
+    llvm::Value* begin = builder.CreateAdd(builder.CreateMul(wide, wide_constant(layout.stride)), wide_constant(attribute.offset));
+    llvm::Value* end = builder.CreateAdd(begin, wide_constant(bytes));
+    llvm::Value* fits = builder.CreateICmpULE(end, is_fixed ? size : splat(size));
+    const std::int64_t extra = channel.word * 4;
+    llvm::Value* bits = nullptr;
+    if (is_fixed) {
+        llvm::Value* address = builder.CreateGEP(builder.getInt8Ty(), data, builder.CreateAdd(begin, int64(extra)));
+        bits = select(fits, builder.CreateAlignedLoad(word, select(fits, address, zeros()), llvm::Align(1)), int32(0));
+    } else {
+        // 32-bit offsets where they are in range keep to the hardware's gather.
+        llvm::Value* offsets = builder.CreateTrunc(begin, vector_of(word));
+        llvm::Value* addresses_of = builder.CreateGEP(builder.getInt8Ty(), at_offset(data, extra), offsets);
+        bits = builder.CreateMaskedGather(vector_of(word), addresses_of, llvm::Align(1), fits, llvm::Constant::getNullValue(vector_of(word)));
+    }
+    const auto constant_word = [&](std::uint32_t value) { return llvm::ConstantInt::get(bits->getType(), value); };
+    const auto float_type = [&]() { return bits->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getFloatTy())) : builder.getFloatTy(); };
+    const auto to_result = [&](llvm::Value* value) -> Component {
+        llvm::Type* kind = scalar_type(scalar);
+        if (is_integer) {
+            llvm::Type* shaped = value->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(kind)) : kind;
+            return Component(builder.CreateZExtOrTrunc(value, shaped));
+        }
+        return Component(kind->isFloatTy() ? value : math.convert_float(value, kind));
+    };
+    const bool is_signed = format.kind == FormatKind::sint || format.kind == FormatKind::snorm;
+    if (channel.bits < 32) {
+        if (is_signed) {
+            bits = builder.CreateAShr(builder.CreateShl(bits, constant_word(32 - channel.shift - channel.bits)), constant_word(32 - channel.bits));
+        } else {
+            bits = builder.CreateAnd(builder.CreateLShr(bits, constant_word(channel.shift)), constant_word((1u << channel.bits) - 1));
+        }
+    }
+    switch (format.kind) {
+        case FormatKind::uint:
+        case FormatKind::sint:
+            if (is_integer) return to_result(bits);
+            return to_result(is_signed ? builder.CreateSIToFP(bits, float_type()) : builder.CreateUIToFP(bits, float_type()));
+        case FormatKind::floating:
+            if (channel.bits == 16) return to_result(math.half_to_float(bits));
+            return is_integer ? to_result(bits) : to_result(builder.CreateBitCast(bits, float_type()));
+        case FormatKind::unorm:
+        case FormatKind::srgb: {
+            const double most = channel.bits == 32 ? 4294967295.0 : (1u << channel.bits) - 1;
+            return to_result(builder.CreateFDiv(builder.CreateUIToFP(bits, float_type()), llvm::ConstantFP::get(float_type(), most)));
+        }
+        case FormatKind::snorm: {
+            const double most = (1u << (channel.bits - 1)) - 1;
+            llvm::Value* value = builder.CreateFDiv(builder.CreateSIToFP(bits, float_type()), llvm::ConstantFP::get(float_type(), most));
+            return to_result(math.f_max(value, llvm::ConstantFP::get(float_type(), -1)));
+        }
+    }
+    return default_value();
+}
+
+std::vector<Component> VertexEmitter::input_components(const Variable& variable) {
+    if (variable.builtin) {
+        const auto draw_word = [&](std::size_t offset) -> Component {
+            return invariant_load(builder.getInt32Ty(), at_offset(draw, static_cast<std::int64_t>(offset)), 4);
+        };
+        switch (*variable.builtin) {
+            case BuiltIn::VertexIndex: return {Component(indices)};
+            case BuiltIn::InstanceIndex: return {Component(instance)};
+            case BuiltIn::BaseVertex: return {draw_word(offsetof(VertexDraw, base_vertex))};
+            case BuiltIn::BaseInstance: return {draw_word(offsetof(VertexDraw, base_instance))};
+            case BuiltIn::DrawIndex: return {draw_word(offsetof(VertexDraw, draw_index))};
+            case BuiltIn::ViewIndex:
+            case BuiltIn::DeviceIndex: return {Component(int32(0))};
+            default: reject("a built-in input is not supported in vertex shaders");
+        }
+    }
+    const auto scalars = interface_scalars(module, variable);
+    if (!scalars) reject(fmt::format("input '{}' has no location, or holds 64-bit values", variable.name));
+    std::vector<Component> made;
+    for (const InterfaceScalar& at : *scalars) {
+        const auto attribute = std::ranges::find(input_.attributes, at.location, &rhi::VertexAttribute::location);
+        if (attribute == input_.attributes.end()) made.push_back(zero(module.type(at.type)));
+        else made.push_back(fetch(*attribute, at.component, module.type(at.type)));
+    }
+    return made;
+}
+
+void VertexEmitter::store_outputs() {
+    llvm::Value* outputs = invariant_load(pointer_type, at_offset(batch, offsetof(VertexBatch, outputs)), 8);
+    const auto put = [&](std::uint32_t slot, const Component& value) {
+        builder.CreateAlignedStore(widen(to_word(value)), at_offset(outputs, std::int64_t{slot} * max_lanes * 4), llvm::Align(64));
+    };
+    bool has_point_size = false;
+    // Clip distances come before cull distances, wherever the shader declares them.
+    struct BuiltInOutput {
+        BuiltIn builtin;
+        std::vector<Component> values;
+    };
+    std::vector<BuiltInOutput> builtins;
+    for (const Id id : module.interface()) {
+        const Variable* variable = module.variable(id);
+        if (!variable || variable->storage != spv::StorageClass::Output) continue;
+        const Type& type = module.type(variable->type);
+        const Pointer pointer = pointer_to(id);
+        if (variable->builtin) {
+            builtins.push_back({*variable->builtin, load(pointer)});
+        } else if (type.kind == TypeKind::structure && !type.members.empty() && type.members[0].builtin) {
+            for (std::uint32_t i = 0; i < type.members.size(); ++i) {
+                if (!uses_member(module, id, i)) continue;
+                Pointer member = pointer;
+                member.component += type.members[i].first_component;
+                member.type = type.members[i].type;
+                builtins.push_back({*type.members[i].builtin, load(member)});
+            }
+        } else {
+            const auto scalars = interface_scalars(module, *variable);
+            if (!scalars) reject(fmt::format("output '{}' has no location, or holds 64-bit values", variable->name));
+            const std::vector<Component> values = load(pointer);
+            for (std::size_t i = 0; i < scalars->size(); ++i) {
+                program.outputs.push_back({(*scalars)[i].location, (*scalars)[i].component, program.output_slots});
+                put(program.output_slots++, values[i]);
+            }
+        }
+    }
+    bool has_position = false;
+    for (const BuiltInOutput& output : builtins) {
+        if (output.builtin == BuiltIn::Position) {
+            has_position = true;
+            for (std::uint32_t i = 0; i < 4; ++i) put(slot_position + i, output.values.at(i));
+        } else if (output.builtin == BuiltIn::PointSize) {
+            has_point_size = true;
+            put(slot_point_size, output.values.at(0));
+        } else if (output.builtin == BuiltIn::ClipDistance) {
+            program.clip_distances = static_cast<std::uint32_t>(std::min<std::size_t>(output.values.size(), 8));
+        } else if (output.builtin == BuiltIn::CullDistance) {
+            program.cull_distances = static_cast<std::uint32_t>(std::min<std::size_t>(output.values.size(), 8));
+        }
+    }
+    if (program.clip_distances + program.cull_distances > 8) reject("clip and cull distances are more than 8 together");
+    for (const BuiltInOutput& output : builtins) {
+        const bool is_clip = output.builtin == BuiltIn::ClipDistance;
+        if (!is_clip && output.builtin != BuiltIn::CullDistance) continue;
+        const std::uint32_t first = slot_clip_distance + (is_clip ? 0 : program.clip_distances);
+        for (std::uint32_t i = 0; i < output.values.size() && first + i < first_user_slot; ++i) put(first + i, output.values[i]);
+    }
+    if (!has_position)
+        for (std::uint32_t i = 0; i < 4; ++i) put(slot_position + i, Component(llvm::ConstantFP::get(builder.getFloatTy(), i == 3)));
+    if (!has_point_size) put(slot_point_size, Component(llvm::ConstantFP::get(builder.getFloatTy(), 1)));
+    program.writes_point_size = has_point_size;
+    std::ranges::sort(program.outputs, {}, [](const VertexOutput& at) { return std::pair(at.location, at.component); });
+}
+
+void VertexEmitter::emit() {
+    auto* type = llvm::FunctionType::get(builder.getVoidTy(), {pointer_type, pointer_type, pointer_type, builder.getInt32Ty()}, false);
+    function_ = llvm::Function::Create(type, llvm::Function::ExternalLinkage, "kernel", target);
+    shader_context = function_->getArg(0);
+    draw = function_->getArg(1);
+    slot_block = llvm::BasicBlock::Create(context, "slots", function_);
+    llvm::BasicBlock* start = llvm::BasicBlock::Create(context, "start", function_);
+    llvm::BasicBlock* loop = llvm::BasicBlock::Create(context, "batch", function_);
+    llvm::BasicBlock* done = llvm::BasicBlock::Create(context, "done", function_);
+    builder.SetInsertPoint(start);
+    builder.CreateCondBr(builder.CreateICmpNE(function_->getArg(3), int32(0)), loop, done);
+    builder.SetInsertPoint(loop);
+    llvm::PHINode* number = builder.CreatePHI(builder.getInt32Ty(), 2, "batch");
+    number->addIncoming(int32(0), start);
+    batch = builder.CreateGEP(builder.getInt8Ty(), function_->getArg(2),
+                              builder.CreateMul(builder.CreateZExt(number, builder.getInt64Ty()), int64(sizeof(VertexBatch))));
+    indices = builder.CreateAlignedLoad(vector_of(builder.getInt32Ty()), at_offset(batch, offsetof(VertexBatch, indices)), llvm::Align(4));
+    instance = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(VertexBatch, instance)), llvm::Align(4));
+    llvm::Value* count = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(VertexBatch, count)), llvm::Align(4));
+    // Lanes behind the last vertex repeat one; only what they write must not be seen.
+    live_slot = make_slot(mask_type, "live");
+    store_live(builder.CreateICmpULT(lane_numbers(), splat(count)));
+    mask = all_lanes();
+    declare_variables();
+    emit_function(module.entry(), {}, all_lanes());
+    mask = all_lanes();
+    store_outputs();
+    llvm::Value* next = builder.CreateAdd(number, int32(1));
+    number->addIncoming(next, builder.GetInsertBlock());
+    builder.CreateCondBr(builder.CreateICmpULT(next, function_->getArg(3)), loop, done);
+    builder.SetInsertPoint(done);
+    builder.CreateRetVoid();
+    builder.SetInsertPoint(slot_block);
+    builder.CreateBr(start);
+    program.has_side_effects = has_side_effects;
+}
+
+}  // namespace nacre::cpu
