@@ -24,7 +24,7 @@ Term round_to_half(const Term& single_bits) {
     const Term normal = shift_right_logical(bounded + odd + (0xfff - static_cast<double>(exponent_gap << 23)), 13);
 
     // Denormal halves: the last place of 0.5 is the unit of denormal halves, so the addition rounds.
-    const Term denormal = (magnitude.from_bits() + 0.5).to_bits() - magnitude.number(0.5).to_bits();
+    const Term denormal = (magnitude.from_bits() + 0.5).to_bits() - magnitude.integer(0x3f000000);
 
     const Term is_nan = magnitude > magnitude.integer(0x7f800000);
     const Term nan = (shift_right_logical(magnitude, 13) & magnitude.integer(0x3ff)) | magnitude.integer(0x7e00);

@@ -193,11 +193,8 @@ def main():
     for degree in (3, 4, 5):
         fit("(tanh(x) - x) / x^3 of x^2", lambda z: (tanh(z.sqrt()) / z.sqrt() - 1) / z,
             lambda z: z * z.sqrt() / tanh(z.sqrt()), tiny, Decimal("0.390625"), degree)
-    split("pi", PI, [9, 9, 9])
-    split("pi / 2", PI / 2, [9, 9, 9])
+    split("pi", PI, [8, 8, 8])
     split("ln 2", LN2, [16])
-    split("pi / 2", PI / 2, [24])
-    split("pi / 255", 1 / Decimal(255), [16])
 
 
 if __name__ == "__main__":

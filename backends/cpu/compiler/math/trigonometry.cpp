@@ -13,7 +13,7 @@ namespace nacre::cpu {
 
 namespace {
 
-constexpr double pi_parts[] = {0x1.92p+1, 0x1.fbp-11, 0x1.51p-21, 0x1.0b4612p-33};
+constexpr double pi_parts[] = {0x1.92p+1, 0x1.fcp-11, -0x1.58p-20, 0x1.10b462p-29};
 
 constexpr float sine_half_turn[] = {-0x1.55554cp-3f, 0x1.110edap-7f, -0x1.9f70eep-13f, 0x1.5dc8c4p-19f};
 constexpr float sine_quarter_turn[] = {-0x1.555546p-3f, 0x1.110778p-7f, -0x1.995408p-13f};
@@ -33,8 +33,9 @@ Term odd_polynomial(const Term& r, const Term& square, std::span<const float> co
 
 /// Sine of x - multiple * pi, with its sign changed where the lowest bit of `flips` is one.
 Term reduced_sine(const Term& x, const Term& multiple, const Term& flips) {
-    // The bounds matter only for arguments so large that the reduction has lost all precision.
-    const Term limit = x.number(0x1.921fb4p+0);
+    // A bit above pi / 2, for what the rounding of x / pi does to large x. Matters only where the reduction has lost all
+    // precision.
+    const Term limit = x.number(1.59);
     const Term rest = min(limit, max(-limit, subtract_pi(x, multiple, 1)));
     return (odd_polynomial(rest, rest * rest, sine_half_turn).to_bits() ^ (flips << 31)).from_bits();
 }
