@@ -12,7 +12,7 @@ Term number_min(const Term& x, const Term& y) { return select(is_nan(x), y, min(
 
 Term number_max(const Term& x, const Term& y) { return select(is_nan(x), y, max(y, x)); }
 
-Term clamp(const Term& x, const Term& low, const Term& high) { return min(high, max(low, x)); }
+Term clamp(const Term& x, const Term& low, const Term& high) { return min(max(x, low), high); }
 
 }  // namespace
 
@@ -31,13 +31,13 @@ llvm::Value* Math::sign(Value* x) {
 
 llvm::Value* Math::f_min(Value* x, Value* y) {
     Emission emission(builder_, options_);
-    return widen_half([](const Term& a, const Term& b) { return min(b, a); }, Term(emission, x), Term(emission, y))
+    return widen_half([](const Term& a, const Term& b) { return min(a, b); }, Term(emission, x), Term(emission, y))
         .value();
 }
 
 llvm::Value* Math::f_max(Value* x, Value* y) {
     Emission emission(builder_, options_);
-    return widen_half([](const Term& a, const Term& b) { return max(b, a); }, Term(emission, x), Term(emission, y))
+    return widen_half([](const Term& a, const Term& b) { return max(a, b); }, Term(emission, x), Term(emission, y))
         .value();
 }
 

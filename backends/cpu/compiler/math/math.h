@@ -111,13 +111,11 @@ class Math {
 
     Value* f_abs(Value* x);
     Value* sign(Value* x);  ///< -1, 0 or 1; 0 for NaN.
-    /// y < x ? y : x, so x where one is NaN.
-    Value* f_min(Value* x, Value* y);
-    /// x < y ? y : x, so x where one is NaN.
-    Value* f_max(Value* x, Value* y);
+    Value* f_min(Value* x, Value* y);  ///< x < y ? x : y, so y where one is NaN.
+    Value* f_max(Value* x, Value* y);  ///< x > y ? x : y, so y where one is NaN.
     Value* n_min(Value* x, Value* y);                   ///< The one that is a number where the other is NaN.
     Value* n_max(Value* x, Value* y);                   ///< The one that is a number where the other is NaN.
-    Value* f_clamp(Value* x, Value* low, Value* high);  ///< f_min(f_max(x, low), high); NaN stays NaN.
+    Value* f_clamp(Value* x, Value* low, Value* high);  ///< f_min(f_max(x, low), high), so low where x is NaN.
     Value* n_clamp(Value* x, Value* low, Value* high);  ///< n_min(n_max(x, low), high); low where x is NaN.
     Value* step(Value* edge, Value* x);                 ///< x < edge ? 0 : 1.
     Value* smooth_step(Value* edge0, Value* edge1, Value* x);

@@ -8,15 +8,13 @@
 #include <string>
 #include <thread>
 
-#include "tests/backends/cpu/math/compiled_function.h"
+#include "tests/backends/cpu/math/evaluate.h"
 #include "tests/backends/cpu/math/samples.h"
 
 // Single precision functions against the C library in double precision.
 
 namespace nacre::cpu {
 namespace {
-
-using Values = std::span<llvm::Value* const>;
 
 struct Function {
     const char* name;
@@ -55,17 +53,6 @@ const Function functions[] = {
     {"inverse_sqrt", &Math::inverse_sqrt, inverse_sqrt, 1.5},
 };
 
-std::vector<float> evaluate(const Function& function, const Variant& variant, const std::vector<float>& x) {
-    const CompiledFunction compiled(variant, {Kind::single}, [&](Math& math, Values arguments) {
-        return std::vector<llvm::Value*>{(math.*function.emit)(arguments[0])};
-    });
-    std::vector<float> result(x.size());
-    const void* inputs[] = {x.data()};
-    void* outputs[] = {result.data()};
-    compiled.run(inputs, outputs, x.size());
-    return result;
-}
-
 struct Worst {
     double ulps = 0;
     float x = 0;
@@ -88,7 +75,7 @@ TEST_P(Accuracy, of_single_precision_is_within_the_bound) {
     const std::vector<float>& x = many_floats();
     for (const bool contract : {false, true}) {
         const Variant variant{.options = {.contract = contract}, .optimized = true};
-        const std::vector<float> result = evaluate(function, variant, x);
+        const std::vector<float> result = evaluate_one<float>(variant, call(function.emit), x);
         Worst worst;
         for (std::size_t i = 0; i < x.size(); ++i) worst.take(function, x[i], result[i]);
         EXPECT_LE(worst.ulps, function.ulps) << function.name << "(" << worst.x << ") = " << worst.result << " and not "
@@ -103,7 +90,7 @@ TEST_P(Accuracy, does_not_depend_on_lanes_or_target) {
     const std::vector<float>& x = many_floats();
     std::vector<float> first;
     for (const Variant& variant : exact_variants()) {
-        const std::vector<float> result = evaluate(function, variant, x);
+        const std::vector<float> result = evaluate_one<float>(variant, call(function.emit), x);
         if (first.empty()) first = result;
         std::size_t different = 0, at = 0;
         for (std::size_t i = 0; i < x.size(); ++i) {

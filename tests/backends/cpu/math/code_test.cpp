@@ -4,14 +4,12 @@
 #include <sstream>
 #include <string>
 
-#include "tests/backends/cpu/math/compiled_function.h"
+#include "tests/backends/cpu/math/evaluate.h"
 
 // What the functions become on a machine with vectors of 16 lanes.
 
 namespace nacre::cpu {
 namespace {
-
-using Values = std::span<llvm::Value* const>;
 
 struct Code {
     unsigned instructions = 0;
@@ -20,9 +18,7 @@ struct Code {
 
 Code code_of(const Variant& variant, const std::vector<Kind>& inputs, const Emit& emit) {
     Code code;
-    const std::string text = assembly(variant, inputs, emit);
-    if (std::getenv("SHOW")) std::puts(text.c_str());
-    std::istringstream lines(text);
+    std::istringstream lines(assembly(variant, inputs, emit));
     for (std::string line; std::getline(lines, line);) {
         if (line.size() < 2 || line[0] != '\t' || line[1] == '.' || line[1] == '#') continue;
         if (line.starts_with("\tretq")) continue;
@@ -30,14 +26,6 @@ Code code_of(const Variant& variant, const std::vector<Kind>& inputs, const Emit
         ++code.instructions;
     }
     return code;
-}
-
-template <typename... Arguments>
-Emit call(llvm::Value* (Math::*function)(Arguments...)) {
-    return [function](Math& math, Values values) {
-        const auto expand = [&]<std::size_t... i>(std::index_sequence<i...>) { return (math.*function)(values[i]...); };
-        return std::vector<llvm::Value*>{expand(std::make_index_sequence<sizeof...(Arguments)>())};
-    };
 }
 
 TEST(Code, of_sixteen_lanes_is_short_and_calls_nothing) {
