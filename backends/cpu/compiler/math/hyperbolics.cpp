@@ -26,8 +26,8 @@ Term sine_hyperbolic(const Term& x) {
     const Term magnitude = abs(x);
     // Half the exponential is finite wherever the result is.
     const Term half_power = exponential(magnitude, -1);
-    const Term large = copy_sign(half_power - 0.25 / half_power, x);
-    return select(magnitude < 1.0, odd_polynomial(x, sinh_rest), large);
+    const Term large = half_power - 0.25 / half_power;
+    return copy_sign(select(magnitude < 1.0, odd_polynomial(magnitude, sinh_rest), large), x);
 }
 
 Term cosine_hyperbolic(const Term& x) {
@@ -37,8 +37,8 @@ Term cosine_hyperbolic(const Term& x) {
 
 Term tangent_hyperbolic(const Term& x) {
     const Term magnitude = abs(x);
-    const Term large = copy_sign(1.0 - 2.0 / (exponential(magnitude + magnitude, 0) + 1.0), x);
-    return select(magnitude < 0.625, odd_polynomial(x, tanh_rest), large);
+    const Term large = 1.0 - 2.0 / (exponential(magnitude + magnitude, 0) + 1.0);
+    return copy_sign(select(magnitude < 0.625, odd_polynomial(magnitude, tanh_rest), large), x);
 }
 
 /// log(1 + u), or log(2 * x) where `is_large`.

@@ -110,9 +110,9 @@ class Math {
     // ---- Comparisons and interpolation: comparisons.cpp ----
 
     Value* f_abs(Value* x);
-    Value* sign(Value* x);  ///< -1, 0 or 1; 0 for NaN.
-    Value* f_min(Value* x, Value* y);  ///< x < y ? x : y, so y where one is NaN.
-    Value* f_max(Value* x, Value* y);  ///< x > y ? x : y, so y where one is NaN.
+    Value* sign(Value* x);                              ///< -1, 0 or 1; 0 for NaN.
+    Value* f_min(Value* x, Value* y);                   ///< x < y ? x : y, so y where one is NaN.
+    Value* f_max(Value* x, Value* y);                   ///< x > y ? x : y, so y where one is NaN.
     Value* n_min(Value* x, Value* y);                   ///< The one that is a number where the other is NaN.
     Value* n_max(Value* x, Value* y);                   ///< The one that is a number where the other is NaN.
     Value* f_clamp(Value* x, Value* low, Value* high);  ///< f_min(f_max(x, low), high), so low where x is NaN.

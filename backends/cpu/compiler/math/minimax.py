@@ -7,9 +7,12 @@ in decimal arithmetic of 50 digits. Coefficients are then rounded to single prec
 the lowest power on; after each rounding those that remain are fitted again to what the rounded ones leave (or simply
 rounded, where that is better). The errors that it prints are those of the polynomial with rounded coefficients, evaluated exactly.
 
-Run it without arguments; exponentials.cpp, trigonometry.cpp and so on hold what it prints.
+exponentials.cpp, trigonometry.cpp and so on hold what it prints. It fails if one of them does not.
 """
+import pathlib
+import re
 import struct
+import sys
 from decimal import Decimal, getcontext
 
 getcontext().prec = 50
@@ -19,6 +22,25 @@ ONE = Decimal(1)
 def single(value):
     """The nearest single precision number."""
     return Decimal(struct.unpack("f", struct.pack("f", float(value)))[0])
+
+
+missing = []
+
+
+def look_up(file, name, numbers):
+    """Prints the numbers and notes whether the source file holds them in this order."""
+    print("{" + ", ".join(short(n) for n in numbers) + "}")
+    text = (pathlib.Path(__file__).parent / (file + ".cpp")).read_text()
+    held = [float.fromhex(literal) for literal in re.findall(r"-?0x1(?:\.[0-9a-f]+)?p[+-]\d+", text)]
+    wanted = [float(n) for n in numbers]
+    # Parts of a constant may stand in declarations of their own.
+    if not any(held[i : i + len(wanted)] == wanted for i in range(len(held))):
+        missing.append(f"{name} in {file}.cpp")
+
+
+def short(number):
+    """As C++ has it, without the zeros that single precision never needs."""
+    return re.sub(r"\.?0*p", "p", float(number).hex())
 
 
 def series(first, ratio):
@@ -122,7 +144,7 @@ def remez(grid, target, weight, powers):
     return best, best_error
 
 
-def fit(name, function, weight, low, high, degree, points=400):
+def fit(file, name, function, weight, low, high, degree, points=400):
     """Prints the polynomial of the given degree that approximates the function on [low, high]."""
     # Denser towards the ends, where the error of a best approximation turns most quickly.
     grid = [(low + high) / 2 - (high - low) / 2 * cos(PI * (2 * i + 1) / (2 * points)) for i in range(points)]
@@ -145,56 +167,50 @@ def fit(name, function, weight, low, high, degree, points=400):
         coefficients, error = plain, plain_error
     print(f"// {name}: degree {degree} on [{float(low):.6g}, {float(high):.6g}], relative error 2^"
           f"{float(error.ln() / LN2):.1f} (2^{float(exact_error.ln() / LN2):.1f} before rounding)")
-    print("{" + ", ".join(float(c).hex() for c in coefficients) + "}")
+    look_up(file, name, coefficients)
 
 
-def split(name, value, bits):
+def split(file, name, value, bits):
     """Prints a constant as a sum of single precision numbers, each but the last of so few bits that products are exact."""
     parts = []
     for count in bits:
         scale = Decimal(2) ** (count - 1 - int((abs(value).ln() / LN2).to_integral_value(rounding="ROUND_FLOOR")))
-        part = (value * scale).to_integral_value() / scale
+        part = (value * scale).to_integral_value(rounding="ROUND_FLOOR") / scale
         parts.append(single(part))
         value -= parts[-1]
     parts.append(single(value))
-    print(f"// {name} = {' + '.join(float(p).hex() for p in parts)}")
+    print(f"// {name} as a sum")
+    look_up(file, name, parts)
+
+
+def odd(function):
+    """(f(x) / x - 1) / x^2 as a function of x^2, and the weight that makes its error the relative error of f."""
+    return (lambda z: (function(z.sqrt()) / z.sqrt() - 1) / z), (lambda z: z * z.sqrt() / function(z.sqrt()))
 
 
 def main():
     half_ln2, root = LN2 / 2, Decimal(2).sqrt()
     tiny = Decimal(10) ** -12
-    for degree in (4, 5):
-        fit("(2^f - 1) / f", lambda f: ((f * LN2).exp() - 1) / f, lambda f: f / (f * LN2).exp(), -ONE / 2, ONE / 2, degree)
-    for degree in (3, 4):
-        fit("(e^r - 1 - r) / r^2", lambda r: (r.exp() - 1 - r) / r**2, lambda r: r**2 / r.exp(), -half_ln2, half_ln2, degree)
-    for degree in (7, 8, 9):
-        fit("log2(1 + f) / f", lambda f: log1p(f) / LN2 / f, lambda f: f * LN2 / log1p(f), 1 / root - 1, root - 1, degree)
-    for degree in (5, 6, 7, 8):
-        fit("(ln(1 + f) - f + f^2 / 2) / f^3", lambda f: (log1p(f) - f + f * f / 2) / f**3, lambda f: f**3 / log1p(f),
-            1 / root - 1, root - 1, degree)
-    for degree in (3, 4):
-        fit("(sin(r) - r) / r^3 of r^2", lambda z: (sin(z.sqrt()) / z.sqrt() - 1) / z,
-            lambda z: z * z.sqrt() / sin(z.sqrt()), tiny, PI**2 / 4, degree)
-    for degree in (1, 2):
-        fit("(sin(r) - r) / r^3 of r^2", lambda z: (sin(z.sqrt()) / z.sqrt() - 1) / z,
-            lambda z: z * z.sqrt() / sin(z.sqrt()), tiny, PI**2 / 16, degree)
-    for degree in (1, 2):
-        fit("(cos(r) - 1 + r^2 / 2) / r^4 of r^2", lambda z: (cos(z.sqrt()) - 1 + z / 2) / z**2,
-            lambda z: z**2 / cos(z.sqrt()), Decimal("1e-8"), PI**2 / 16, degree)
-    for degree in (3, 4):
-        fit("(asin(s) - s) / s^3 of s^2", lambda z: (asin(z.sqrt()) / z.sqrt() - 1) / z,
-            lambda z: z * z.sqrt() / asin(z.sqrt()), tiny, ONE / 4, degree)
-    for degree in (6, 7, 8, 9):
-        fit("(atan(t) - t) / t^3 of t^2", lambda z: (atan(z.sqrt()) / z.sqrt() - 1) / z,
-            lambda z: z * z.sqrt() / atan(z.sqrt()), tiny, ONE, degree)
-    for degree in (1, 2, 3):
-        fit("(sinh(x) - x) / x^3 of x^2", lambda z: (sinh(z.sqrt()) / z.sqrt() - 1) / z,
-            lambda z: z * z.sqrt() / sinh(z.sqrt()), tiny, ONE, degree)
-    for degree in (3, 4, 5):
-        fit("(tanh(x) - x) / x^3 of x^2", lambda z: (tanh(z.sqrt()) / z.sqrt() - 1) / z,
-            lambda z: z * z.sqrt() / tanh(z.sqrt()), tiny, Decimal("0.390625"), degree)
-    split("pi", PI, [8, 8, 8])
-    split("ln 2", LN2, [16])
+    fit("exponentials", "(2^f - 1) / f", lambda f: ((f * LN2).exp() - 1) / f, lambda f: f / (f * LN2).exp(),
+        -ONE / 2, ONE / 2, 5)
+    fit("exponentials", "(e^r - 1 - r) / r^2", lambda r: (r.exp() - 1 - r) / r**2, lambda r: r**2 / r.exp(),
+        -half_ln2, half_ln2, 4)
+    fit("exponentials", "log2(1 + f) / f", lambda f: log1p(f) / LN2 / f, lambda f: f * LN2 / log1p(f),
+        1 / root - 1, root - 1, 8)
+    fit("exponentials", "(ln(1 + f) - f + f^2 / 2) / f^3", lambda f: (log1p(f) - f + f * f / 2) / f**3,
+        lambda f: f**3 / log1p(f), 1 / root - 1, root - 1, 7)
+    split("exponentials", "ln 2", LN2, [16])
+    fit("trigonometry", "(sin(r) - r) / r^3 of r^2", *odd(sin), tiny, PI**2 / 4, 3)
+    fit("trigonometry", "(sin(r) - r) / r^3 of r^2", *odd(sin), tiny, PI**2 / 16, 2)
+    fit("trigonometry", "(cos(r) - 1 + r^2 / 2) / r^4 of r^2", lambda z: (cos(z.sqrt()) - 1 + z / 2) / z**2,
+        lambda z: z**2 / cos(z.sqrt()), Decimal("1e-8"), PI**2 / 16, 2)
+    split("trigonometry", "pi", PI, [8, 8, 8])
+    fit("inverse_trigonometry", "(asin(s) - s) / s^3 of s^2", *odd(asin), tiny, ONE / 4, 4)
+    fit("inverse_trigonometry", "(atan(t) - t) / t^3 of t^2", *odd(atan), tiny, ONE, 8)
+    fit("hyperbolics", "(sinh(x) - x) / x^3 of x^2", *odd(sinh), tiny, ONE, 3)
+    fit("hyperbolics", "(tanh(x) - x) / x^3 of x^2", *odd(tanh), tiny, Decimal("0.390625"), 4)
+    if missing:
+        sys.exit(f"not in the sources: {', '.join(missing)}")
 
 
 if __name__ == "__main__":

@@ -6,14 +6,14 @@
 // Sine and cosine: x is taken to the nearest multiple of pi (for the cosine: the nearest odd multiple of pi / 2) and a
 // rest in
 // [-pi/2, pi/2], whose sine a single polynomial gives; nothing has to be selected. The multiple is subtracted in four
-// parts, the first three of so few bits that their products are exact (Cody and Waite, "Software Manual for the
-// Elementary Functions", 1980). Coefficients and parts: minimax.py.
+// parts, the first three of so few bits that their products are exact, all of one sign so that -0 stays -0 (Cody and
+// Waite, "Software Manual for the Elementary Functions", 1980). Coefficients and parts: minimax.py.
 
 namespace nacre::cpu {
 
 namespace {
 
-constexpr double pi_parts[] = {0x1.92p+1, 0x1.fcp-11, -0x1.58p-20, 0x1.10b462p-29};
+constexpr double pi_parts[] = {0x1.92p+1, 0x1.fap-11, 0x1.54p-19, 0x1.10b462p-29};
 
 constexpr float sine_half_turn[] = {-0x1.55554cp-3f, 0x1.110edap-7f, -0x1.9f70eep-13f, 0x1.5dc8c4p-19f};
 constexpr float sine_quarter_turn[] = {-0x1.555546p-3f, 0x1.110778p-7f, -0x1.995408p-13f};
@@ -31,13 +31,23 @@ Term odd_polynomial(const Term& r, const Term& square, std::span<const float> co
     return multiply_add(r * square, polynomial(square, coefficients), r);
 }
 
+/// The sign bit of x alone.
+Term sign_bit(const Term& x) {
+    const Term bits = x.to_bits();
+    return bits & bits.integer(0x80000000);
+}
+
 /// Sine of x - multiple * pi, with its sign changed where the lowest bit of `flips` is one.
 Term reduced_sine(const Term& x, const Term& multiple, const Term& flips) {
-    // A bit above pi / 2, for what the rounding of x / pi does to large x. Matters only where the reduction has lost all
+    const Term rest = subtract_pi(x, multiple, 1);
+    // The magnitude and the sign go separate ways, because the polynomial would lose the sign of -0. The bound is a bit
+    // above pi / 2, for what the rounding of x / pi does to large x; it matters only where the reduction has lost all
     // precision.
-    const Term limit = x.number(1.59);
-    const Term rest = min(limit, max(-limit, subtract_pi(x, multiple, 1)));
-    return (odd_polynomial(rest, rest * rest, sine_half_turn).to_bits() ^ (flips << 31)).from_bits();
+    const Term magnitude = min(x.number(1.59), abs(rest));
+    const Term sine = odd_polynomial(magnitude, magnitude * magnitude, sine_half_turn);
+    // Shaders take sqrt(1 - sin(x)^2): it must not become NaN for a last place.
+    const Term bounded = min(x.number(1), sine);
+    return (bounded.to_bits() ^ (flips << 31) ^ sign_bit(rest)).from_bits();
 }
 
 Term sine(const Term& x) {
@@ -54,12 +64,14 @@ Term cosine(const Term& x) {
 Term tangent(const Term& x) {
     const Rounded quarter_turns = round_to_whole(x * (2 * std::numbers::inv_pi));
     const Term rest = subtract_pi(x, quarter_turns.number, 0.5);
-    const Term square = rest * rest;
-    const Term sine = odd_polynomial(rest, square, sine_quarter_turn);
+    const Term magnitude = abs(rest);
+    const Term square = magnitude * magnitude;
+    const Term sine = odd_polynomial(magnitude, square, sine_quarter_turn);
     const Term cosine =
         multiply_add(square * square, polynomial(square, cosine_quarter_turn), multiply_add(square, -0.5, x.number(1)));
     const Term is_odd = (quarter_turns.bits & quarter_turns.bits.integer(1)) == 1.0;
-    return select(is_odd, -cosine, sine) / select(is_odd, sine, cosine);
+    const Term tangent = select(is_odd, -cosine, sine) / select(is_odd, sine, cosine);
+    return (tangent.to_bits() ^ sign_bit(rest)).from_bits();
 }
 
 }  // namespace

@@ -60,7 +60,9 @@ TEST(Code, of_sixteen_lanes_is_short_and_calls_nothing) {
     };
     for (const auto& function : functions) {
         const Code code = code_of({.processor = "x86-64-v4"}, function.inputs, function.emit);
-        const Code contracted = code_of({.processor = "x86-64-v4", .options = {.contract = true, .half_instructions = true}}, function.inputs, function.emit);
+        const Code contracted =
+            code_of({.processor = "x86-64-v4", .options = {.contract = true, .half_instructions = true}},
+                    function.inputs, function.emit);
         EXPECT_LE(code.instructions, function.most) << function.name;
         EXPECT_LE(contracted.instructions, code.instructions) << function.name;
         EXPECT_FALSE(code.has_calls || contracted.has_calls) << function.name;

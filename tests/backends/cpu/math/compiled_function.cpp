@@ -46,7 +46,8 @@ llvm::orc::JITTargetMachineBuilder target_of(const Variant& variant) {
     }();
     (void)initialized;
     auto target = or_exit(llvm::orc::JITTargetMachineBuilder::detectHost());
-    // What LLJIT chooses on its own; the default of a target machine for a JIT loads the address of every constant first.
+    // What LLJIT chooses on its own; the default of a target machine for a JIT loads the address of every constant
+    // first.
     target.setCodeModel(llvm::CodeModel::Small);
     target.setRelocationModel(llvm::Reloc::PIC_);
     if (!variant.processor.empty()) {
@@ -80,8 +81,9 @@ void make_loop(llvm::Module& module, const Variant& variant, const std::vector<K
     llvm::IRBuilder<> builder(context);
     llvm::Type* pointer = builder.getPtrTy();
     llvm::Type* size = builder.getInt64Ty();
-    auto* function = llvm::Function::Create(llvm::FunctionType::get(builder.getVoidTy(), {pointer, pointer, size}, false),
-                                            llvm::Function::ExternalLinkage, "run", module);
+    auto* function =
+        llvm::Function::Create(llvm::FunctionType::get(builder.getVoidTy(), {pointer, pointer, size}, false),
+                               llvm::Function::ExternalLinkage, "run", module);
     auto* entry = llvm::BasicBlock::Create(context, "entry", function);
     auto* body = llvm::BasicBlock::Create(context, "body", function);
     auto* end = llvm::BasicBlock::Create(context, "end", function);
@@ -97,8 +99,8 @@ void make_loop(llvm::Module& module, const Variant& variant, const std::vector<K
     std::vector<llvm::Value*> arguments;
     for (std::size_t i = 0; i < inputs.size(); ++i) {
         llvm::Type* element = element_type(context, inputs[i]);
-        arguments.push_back(builder.CreateAlignedLoad(value_type(element, variant.lanes),
-                                                      element_address(function->getArg(0), i, element), llvm::Align(1)));
+        arguments.push_back(builder.CreateAlignedLoad(
+            value_type(element, variant.lanes), element_address(function->getArg(0), i, element), llvm::Align(1)));
     }
     Math math(builder, variant.options);
     const std::vector<llvm::Value*> results = emit(math, arguments);
@@ -124,8 +126,9 @@ std::string Variant::name() const {
 
 std::vector<Variant> exact_variants() {
     return {
-        {.lanes = 16, .optimized = true}, {.lanes = 1},  {.lanes = 4, .optimized = true}, {.lanes = 8},
-        {.lanes = 4, .processor = "x86-64"},  {.lanes = 1, .processor = "x86-64", .optimized = true},
+        {.lanes = 16, .optimized = true},        {.lanes = 1},
+        {.lanes = 4, .optimized = true},         {.lanes = 8},
+        {.lanes = 4, .processor = "x86-64"},     {.lanes = 1, .processor = "x86-64", .optimized = true},
         {.lanes = 16, .processor = "x86-64-v3"},
     };
 }
@@ -154,7 +157,8 @@ CompiledFunction::CompiledFunction(const Variant& variant, std::vector<Kind> inp
 CompiledFunction::~CompiledFunction() = default;
 CompiledFunction::CompiledFunction(CompiledFunction&&) noexcept = default;
 
-void CompiledFunction::run(std::span<const void* const> inputs, std::span<void* const> outputs, std::size_t count) const {
+void CompiledFunction::run(std::span<const void* const> inputs, std::span<void* const> outputs,
+                           std::size_t count) const {
     if (count % 16 != 0) std::abort();
     if (count > 0) program_->run(inputs.data(), outputs.data(), count);
 }

@@ -32,7 +32,8 @@ std::vector<Variant> exact_variants();
 /// Emits a function of the given arguments, each a scalar or a vector.
 using Emit = std::function<std::vector<llvm::Value*>(Math&, std::span<llvm::Value* const>)>;
 
-/// A loop over arrays around what Math emits, compiled into memory. Compilation errors end the test program with a message.
+/// A loop over arrays around what Math emits, compiled into memory. Compilation errors end the test program with a
+/// message.
 class CompiledFunction {
   public:
     CompiledFunction(const Variant& variant, std::vector<Kind> inputs, const Emit& emit);

@@ -25,19 +25,25 @@ struct Half {
 
 template <typename T>
 constexpr Kind kind_of() {
-    if constexpr (std::is_same_v<T, Half>) return Kind::half;
-    else if constexpr (std::is_same_v<T, float>) return Kind::single;
-    else if constexpr (std::is_same_v<T, double>) return Kind::number64;
-    else if constexpr (sizeof(T) == 1) return Kind::int8;
-    else if constexpr (sizeof(T) == 2) return Kind::int16;
-    else if constexpr (sizeof(T) == 4) return Kind::int32;
-    else return Kind::int64;
+    if constexpr (std::is_same_v<T, Half>)
+        return Kind::half;
+    else if constexpr (std::is_same_v<T, float>)
+        return Kind::single;
+    else if constexpr (std::is_same_v<T, double>)
+        return Kind::number64;
+    else if constexpr (sizeof(T) == 1)
+        return Kind::int8;
+    else if constexpr (sizeof(T) == 2)
+        return Kind::int16;
+    else if constexpr (sizeof(T) == 4)
+        return Kind::int32;
+    else
+        return Kind::int64;
 }
 
 /// A call of one function of Math.
 template <typename... Arguments>
-    requires(std::same_as<Arguments, llvm::Value*> && ...)
-Emit call(llvm::Value* (Math::*function)(Arguments...)) {
+requires(std::same_as<Arguments, llvm::Value*>&&...) Emit call(llvm::Value* (Math::*function)(Arguments...)) {
     return [function](Math& math, Values values) {
         const auto expand = [&]<std::size_t... i>(std::index_sequence<i...>) { return (math.*function)(values[i]...); };
         return std::vector<llvm::Value*>{expand(std::make_index_sequence<sizeof...(Arguments)>())};
@@ -53,12 +59,14 @@ std::tuple<std::vector<Results>...> evaluate(const Variant& variant, const Emit&
     (inputs.resize(padded), ...);
     std::tuple<std::vector<Results>...> results;
     const void* input_data[] = {inputs.data()...};
-    std::apply([&](auto&... result) {
-        (result.resize(padded), ...);
-        void* output_data[] = {result.data()...};
-        compiled.run(input_data, output_data, padded);
-        (result.resize(count), ...);
-    }, results);
+    std::apply(
+        [&](auto&... result) {
+            (result.resize(padded), ...);
+            void* output_data[] = {result.data()...};
+            compiled.run(input_data, output_data, padded);
+            (result.resize(count), ...);
+        },
+        results);
     return results;
 }
 
@@ -93,8 +101,10 @@ std::pair<std::vector<T>, std::vector<T>> all_pairs(const std::vector<T>& values
 /// Small integers as numbers, for printing and for arithmetic in wider types.
 template <typename T>
 auto printable(T value) {
-    if constexpr (std::is_integral_v<T>) return +value;
-    else return value;
+    if constexpr (std::is_integral_v<T>)
+        return +value;
+    else
+        return value;
 }
 
 }  // namespace nacre::cpu

@@ -60,7 +60,10 @@ std::vector<Variant> variants() {
     std::vector<Variant> result = exact_variants();
     for (const unsigned lanes : {1u, 4u, 8u, 16u})
         for (const bool optimized : {false, true})
-            result.push_back({.lanes = lanes, .processor = "x86-64-v3", .options = {.half_instructions = true}, .optimized = optimized});
+            result.push_back({.lanes = lanes,
+                              .processor = "x86-64-v3",
+                              .options = {.half_instructions = true},
+                              .optimized = optimized});
     return result;
 }
 
@@ -80,20 +83,24 @@ TEST(Half, becomes_single_from_the_low_bits_of_words) {
     for (const Variant& variant : variants()) {
         const std::vector<float> result = evaluate_one<float>(variant, call(&Math::half_to_float), words);
         for (std::size_t i = 0; i < words.size(); ++i)
-            ASSERT_EQ(std::bit_cast<std::uint32_t>(result[i]), std::bit_cast<std::uint32_t>(expected_float(static_cast<std::uint16_t>(i))));
+            ASSERT_EQ(std::bit_cast<std::uint32_t>(result[i]),
+                      std::bit_cast<std::uint32_t>(expected_float(static_cast<std::uint16_t>(i))));
     }
 }
 
-/// Rounding is monotonic: with the floats around every middle between two halves right, and the halves themselves, all are.
+/// Rounding is monotonic: with the floats around every middle between two halves right, and the halves themselves, all
+/// are.
 std::vector<float> floats_around_halves() {
     std::vector<float> result = few_floats();
     for (std::uint32_t bits = 0; bits < half_infinity; ++bits) {
         const double next = bits + 1 == half_infinity ? 65536.0 : half_number(bits + 1);
         const auto middle = static_cast<float>((half_number(bits) + next) / 2);
-        for (const float x : {static_cast<float>(half_number(bits)), middle, std::nextafter(middle, 0.0f), std::nextafter(middle, 1e9f)})
+        for (const float x : {static_cast<float>(half_number(bits)), middle, std::nextafter(middle, 0.0f),
+                              std::nextafter(middle, 1e9f)})
             for (const float sign : {1.0f, -1.0f}) result.push_back(sign * x);
     }
-    for (std::uint64_t i = 0; i < 10000; ++i) result.push_back(std::bit_cast<float>(static_cast<std::uint32_t>(noise(i))));
+    for (std::uint64_t i = 0; i < 10000; ++i)
+        result.push_back(std::bit_cast<float>(static_cast<std::uint32_t>(noise(i))));
     return result;
 }
 
@@ -104,13 +111,15 @@ TEST(Half, is_the_nearest_to_single) {
     for (const Variant& variant : variants()) {
         const std::vector<std::uint16_t> result = evaluate_one<std::uint16_t>(variant, call(&Math::float_to_half), x);
         for (std::size_t i = 0; i < x.size(); ++i)
-            ASSERT_EQ(result[i], expected[i]) << x[i] << " " << std::hex << std::bit_cast<std::uint32_t>(x[i]) << "; " << variant.name();
+            ASSERT_EQ(result[i], expected[i])
+                << x[i] << " " << std::hex << std::bit_cast<std::uint32_t>(x[i]) << "; " << variant.name();
     }
 }
 
 TEST(Half, is_rounded_to_by_way_of_single_from_double) {
     std::vector<double> x;
-    for (const float a : floats_around_halves()) x.push_back(std::isnan(a) ? 0.0 : std::nextafter(static_cast<double>(a), 1e9));
+    for (const float a : floats_around_halves())
+        x.push_back(std::isnan(a) ? 0.0 : std::nextafter(static_cast<double>(a), 1e9));
     for (const Variant& variant : exact_variants()) {
         const std::vector<std::uint16_t> result = evaluate_one<std::uint16_t>(variant, call(&Math::float_to_half), x);
         for (std::size_t i = 0; i < x.size(); ++i) ASSERT_EQ(result[i], nearest_half(static_cast<float>(x[i]))) << x[i];
@@ -139,27 +148,43 @@ TEST(Half, functions_are_those_of_single_precision_rounded) {
     }
     const std::vector<Half> reversed(halves.rbegin(), halves.rend());
     const std::vector<float> reversed_singles(singles.rbegin(), singles.rend());
-    const auto compare = [&](const char* name, const std::vector<Half>& result, const std::vector<float>& single, const Variant& variant) {
+    const auto compare = [&](const char* name, const std::vector<Half>& result, const std::vector<float>& single,
+                             const Variant& variant) {
         for (std::size_t i = 0; i < result.size(); ++i) {
             if (std::isnan(single[i])) {
                 ASSERT_GT(result[i].bits & 0x7fff, half_infinity) << name;
             } else {
-                ASSERT_EQ(result[i].bits, nearest_half(single[i])) << name << " of " << singles[i] << "; " << variant.name();
+                ASSERT_EQ(result[i].bits, nearest_half(single[i]))
+                    << name << " of " << singles[i] << "; " << variant.name();
             }
         }
     };
     const struct {
         const char* name;
         llvm::Value* (Math::*function)(llvm::Value*);
-    } of_one[] = {{"sin", &Math::sin}, {"tan", &Math::tan}, {"acos", &Math::acos}, {"exp2", &Math::exp2}, {"log", &Math::log}, {"tanh", &Math::tanh},
-                  {"sqrt", &Math::sqrt}, {"inverse_sqrt", &Math::inverse_sqrt}, {"floor", &Math::floor}, {"round", &Math::round}, {"round_even", &Math::round_even},
-                  {"fract", &Math::fract}, {"sign", &Math::sign}, {"abs", &Math::f_abs}};
+    } of_one[] = {{"sin", &Math::sin},
+                  {"tan", &Math::tan},
+                  {"acos", &Math::acos},
+                  {"exp2", &Math::exp2},
+                  {"log", &Math::log},
+                  {"tanh", &Math::tanh},
+                  {"sqrt", &Math::sqrt},
+                  {"inverse_sqrt", &Math::inverse_sqrt},
+                  {"floor", &Math::floor},
+                  {"round", &Math::round},
+                  {"round_even", &Math::round_even},
+                  {"fract", &Math::fract},
+                  {"sign", &Math::sign},
+                  {"abs", &Math::f_abs}};
     const struct {
         const char* name;
         llvm::Value* (Math::*function)(llvm::Value*, llvm::Value*);
-    } of_two[] = {{"pow", &Math::pow}, {"atan2", &Math::atan2}, {"f_min", &Math::f_min}, {"n_max", &Math::n_max}, {"f_mod", &Math::f_mod}, {"step", &Math::step}};
-    for (const Variant& variant : {Variant{.lanes = 16, .optimized = true}, Variant{.lanes = 4, .processor = "x86-64"}, Variant{.lanes = 1, .processor = "x86-64"},
-                                   Variant{.lanes = 8, .processor = "x86-64-v3", .options = {.half_instructions = true}}}) {
+    } of_two[] = {{"pow", &Math::pow},     {"atan2", &Math::atan2}, {"f_min", &Math::f_min},
+                  {"n_max", &Math::n_max}, {"f_mod", &Math::f_mod}, {"step", &Math::step}};
+    for (const Variant& variant :
+         {Variant{.lanes = 16, .optimized = true}, Variant{.lanes = 4, .processor = "x86-64"},
+          Variant{.lanes = 1, .processor = "x86-64"},
+          Variant{.lanes = 8, .processor = "x86-64-v3", .options = {.half_instructions = true}}}) {
         const Variant single{.lanes = 16};
         for (const auto& function : of_one)
             compare(function.name, evaluate_one<Half>(variant, call(function.function), halves),
@@ -213,12 +238,16 @@ TEST(Half, becomes_integers_and_comes_from_them) {
         integers.push_back(static_cast<std::int32_t>(b) * 4 - 131072 + static_cast<std::int32_t>(noise(b) % 4));
         wide.push_back(noise(b) >> (b % 64));
     }
-    const auto to_integer = [](Math& math, Values values) { return std::vector<llvm::Value*>{math.float_to_int(values[0], 16, true)}; };
+    const auto to_integer = [](Math& math, Values values) {
+        return std::vector<llvm::Value*>{math.float_to_int(values[0], 16, true)};
+    };
     const auto from_signed = [](Math& math, Values values) {
-        return std::vector<llvm::Value*>{math.int_to_float(values[0], llvm::Type::getHalfTy(values[0]->getContext()), true)};
+        return std::vector<llvm::Value*>{
+            math.int_to_float(values[0], llvm::Type::getHalfTy(values[0]->getContext()), true)};
     };
     const auto from_unsigned = [](Math& math, Values values) {
-        return std::vector<llvm::Value*>{math.int_to_float(values[0], llvm::Type::getHalfTy(values[0]->getContext()), false)};
+        return std::vector<llvm::Value*>{
+            math.int_to_float(values[0], llvm::Type::getHalfTy(values[0]->getContext()), false)};
     };
     for (const Variant& variant : {Variant{.lanes = 16}, Variant{.lanes = 1, .processor = "x86-64"}}) {
         const auto result = evaluate_one<std::int16_t>(variant, to_integer, halves);

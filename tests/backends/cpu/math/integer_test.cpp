@@ -50,7 +50,8 @@ class Integer : public testing::Test {
         for (const Variant& variant : exact_variants()) {
             const auto result = evaluate_one<Number>(variant, emit, x);
             for (std::size_t i = 0; i < x.size(); ++i)
-                ASSERT_EQ(+result[i], +static_cast<Number>(expected(x[i]))) << name << " " << +x[i] << "; " << variant.name();
+                ASSERT_EQ(+result[i], +static_cast<Number>(expected(x[i])))
+                    << name << " " << +x[i] << "; " << variant.name();
         }
     }
 
@@ -72,8 +73,10 @@ class Integer : public testing::Test {
             const auto [first, second] = evaluate<Number, Number>(variant, emit, x, y);
             for (std::size_t i = 0; i < x.size(); ++i) {
                 const auto [expected_first, expected_second] = expected(x[i], y[i]);
-                ASSERT_TRUE(first[i] == static_cast<Number>(expected_first) && second[i] == static_cast<Number>(expected_second))
-                    << name << " " << +x[i] << " " << +y[i] << " = " << +first[i] << ", " << +second[i] << "; " << variant.name();
+                ASSERT_TRUE(first[i] == static_cast<Number>(expected_first) &&
+                            second[i] == static_cast<Number>(expected_second))
+                    << name << " " << +x[i] << " " << +y[i] << " = " << +first[i] << ", " << +second[i] << "; "
+                    << variant.name();
             }
         }
     }
@@ -95,8 +98,10 @@ TYPED_TEST(Integer, is_divided_without_traps) {
         return remainder != 0 && (remainder < 0) != (s(y) < 0) ? remainder + s(y) : remainder;
     });
     constexpr Unsigned ones = std::numeric_limits<Unsigned>::max();
-    this->check_two("u_div", call(&Math::u_div), [](Unsigned x, Unsigned y) { return y == 0 ? ones : static_cast<Unsigned>(x / y); });
-    this->check_two("u_mod", call(&Math::u_mod), [](Unsigned x, Unsigned y) { return y == 0 ? ones : static_cast<Unsigned>(x % y); });
+    this->check_two("u_div", call(&Math::u_div),
+                    [](Unsigned x, Unsigned y) { return y == 0 ? ones : static_cast<Unsigned>(x / y); });
+    this->check_two("u_mod", call(&Math::u_mod),
+                    [](Unsigned x, Unsigned y) { return y == 0 ? ones : static_cast<Unsigned>(x % y); });
 }
 
 TYPED_TEST(Integer, is_divided_by_constants) {
@@ -104,15 +109,22 @@ TYPED_TEST(Integer, is_divided_by_constants) {
     for (const int divisor : {0, 1, -1, 3, 10, -7, 64}) {
         const auto with_constant = [&](llvm::Value* (Math::*function)(llvm::Value*, llvm::Value*)) -> Emit {
             return [function, divisor](Math& math, Values values) {
-                llvm::Value* constant = llvm::ConstantInt::get(values[0]->getType(), static_cast<std::uint64_t>(divisor), true);
+                llvm::Value* constant =
+                    llvm::ConstantInt::get(values[0]->getType(), static_cast<std::uint64_t>(divisor), true);
                 return std::vector<llvm::Value*>{(math.*function)(values[0], constant)};
             };
         };
-        this->check_one("s_div", with_constant(&Math::s_div), [&](Unsigned x) { return divisor == 0 ? 0 : TestFixture::as_signed(x) / divisor; });
-        this->check_one("s_rem", with_constant(&Math::s_rem), [&](Unsigned x) { return divisor == 0 ? -1 : TestFixture::as_signed(x) % divisor; });
+        this->check_one("s_div", with_constant(&Math::s_div),
+                        [&](Unsigned x) { return divisor == 0 ? 0 : TestFixture::as_signed(x) / divisor; });
+        this->check_one("s_rem", with_constant(&Math::s_rem),
+                        [&](Unsigned x) { return divisor == 0 ? -1 : TestFixture::as_signed(x) % divisor; });
         const Unsigned positive = static_cast<Unsigned>(divisor);
-        this->check_one("u_div", with_constant(&Math::u_div), [&](Unsigned x) { return positive == 0 ? std::numeric_limits<Unsigned>::max() : static_cast<Unsigned>(x / positive); });
-        this->check_one("u_mod", with_constant(&Math::u_mod), [&](Unsigned x) { return positive == 0 ? std::numeric_limits<Unsigned>::max() : static_cast<Unsigned>(x % positive); });
+        this->check_one("u_div", with_constant(&Math::u_div), [&](Unsigned x) {
+            return positive == 0 ? std::numeric_limits<Unsigned>::max() : static_cast<Unsigned>(x / positive);
+        });
+        this->check_one("u_mod", with_constant(&Math::u_mod), [&](Unsigned x) {
+            return positive == 0 ? std::numeric_limits<Unsigned>::max() : static_cast<Unsigned>(x % positive);
+        });
     }
 }
 
@@ -120,9 +132,12 @@ TYPED_TEST(Integer, is_shifted_by_any_amount) {
     using Unsigned = typename TestFixture::Number;
     constexpr int mask = TestFixture::width - 1;
     const auto s = [](Unsigned x) { return TestFixture::as_signed(x); };
-    this->check_two("left", call(&Math::shift_left), [](Unsigned x, Unsigned y) { return UnsignedWide{x} << (y & mask); });
-    this->check_two("right", call(&Math::shift_right_logical), [](Unsigned x, Unsigned y) { return UnsignedWide{x} >> (y & mask); });
-    this->check_two("right, signed", call(&Math::shift_right_arithmetic), [&](Unsigned x, Unsigned y) { return s(x) >> (y & mask); });
+    this->check_two("left", call(&Math::shift_left),
+                    [](Unsigned x, Unsigned y) { return UnsignedWide{x} << (y & mask); });
+    this->check_two("right", call(&Math::shift_right_logical),
+                    [](Unsigned x, Unsigned y) { return UnsignedWide{x} >> (y & mask); });
+    this->check_two("right, signed", call(&Math::shift_right_arithmetic),
+                    [&](Unsigned x, Unsigned y) { return s(x) >> (y & mask); });
 }
 
 TYPED_TEST(Integer, is_searched_for_bits) {
@@ -139,9 +154,8 @@ TYPED_TEST(Integer, is_searched_for_bits) {
         return -1;
     });
     this->check_one("find_u_msb", call(&Math::find_u_msb), highest);
-    this->check_one("find_s_msb", call(&Math::find_s_msb), [&](Unsigned x) {
-        return highest(x >> (bits - 1) ? static_cast<Unsigned>(~x) : x);
-    });
+    this->check_one("find_s_msb", call(&Math::find_s_msb),
+                    [&](Unsigned x) { return highest(x >> (bits - 1) ? static_cast<Unsigned>(~x) : x); });
     this->check_one("bit_count", call(&Math::bit_count), [](Unsigned x) {
         int count = 0;
         for (int i = 0; i < bits; ++i) count += static_cast<int>(x >> i & 1);
@@ -164,19 +178,24 @@ TYPED_TEST(Integer, has_a_sign_and_an_order) {
     this->check_two("u_min", call(&Math::u_min), [](Unsigned x, Unsigned y) { return std::min(x, y); });
     this->check_two("u_max", call(&Math::u_max), [](Unsigned x, Unsigned y) { return std::max(x, y); });
     const auto clamp_to_next = [](auto function) -> Emit {
-        return [function](Math& math, Values values) { return std::vector<llvm::Value*>{(math.*function)(values[0], values[1], values[1])}; };
+        return [function](Math& math, Values values) {
+            return std::vector<llvm::Value*>{(math.*function)(values[0], values[1], values[1])};
+        };
     };
     this->check_two("s_clamp", clamp_to_next(&Math::s_clamp), [](Unsigned, Unsigned y) { return y; });
     this->check_two("u_clamp", clamp_to_next(&Math::u_clamp), [](Unsigned, Unsigned y) { return y; });
     const auto clamp_to_some = [](auto function, int low, int high) -> Emit {
         return [=](Math& math, Values values) {
             llvm::Type* type = values[0]->getType();
-            return std::vector<llvm::Value*>{(math.*function)(values[0], llvm::ConstantInt::get(type, static_cast<std::uint64_t>(low), true),
-                                                              llvm::ConstantInt::get(type, static_cast<std::uint64_t>(high), true))};
+            return std::vector<llvm::Value*>{
+                (math.*function)(values[0], llvm::ConstantInt::get(type, static_cast<std::uint64_t>(low), true),
+                                 llvm::ConstantInt::get(type, static_cast<std::uint64_t>(high), true))};
         };
     };
-    this->check_one("s_clamp", clamp_to_some(&Math::s_clamp, -5, 7), [&](Unsigned x) { return std::clamp(s(x), Wide{-5}, Wide{7}); });
-    this->check_one("u_clamp", clamp_to_some(&Math::u_clamp, 5, 70), [](Unsigned x) { return std::clamp<Unsigned>(x, 5, 70); });
+    this->check_one("s_clamp", clamp_to_some(&Math::s_clamp, -5, 7),
+                    [&](Unsigned x) { return std::clamp(s(x), Wide{-5}, Wide{7}); });
+    this->check_one("u_clamp", clamp_to_some(&Math::u_clamp, 5, 70),
+                    [](Unsigned x) { return std::clamp<Unsigned>(x, 5, 70); });
 }
 
 TYPED_TEST(Integer, is_added_and_multiplied_with_all_digits) {
@@ -199,9 +218,8 @@ TYPED_TEST(Integer, is_added_and_multiplied_with_all_digits) {
         const UnsignedWide sum = UnsignedWide{x} + y;
         return std::pair(sum, sum >> bits);
     });
-    this->check_pair("usub_borrow", carried(&Math::usub_borrow), [](Unsigned x, Unsigned y) {
-        return std::pair(UnsignedWide{x} - y, x < y ? 1 : 0);
-    });
+    this->check_pair("usub_borrow", carried(&Math::usub_borrow),
+                     [](Unsigned x, Unsigned y) { return std::pair(UnsignedWide{x} - y, x < y ? 1 : 0); });
     this->check_pair("umul_extended", product(&Math::umul_extended), [](Unsigned x, Unsigned y) {
         const UnsignedWide whole = UnsignedWide{x} * y;
         return std::pair(whole, whole >> bits);
@@ -236,13 +254,15 @@ void check_bit_fields(const std::vector<Unsigned>& samples) {
     };
     for (std::uint64_t o = 0; o <= bits + 2; ++o)
         for (std::uint64_t c = 0; c <= bits + 2; ++c) add(o, c);
-    for (const std::uint64_t large : {std::uint64_t{200}, std::uint64_t{255}, std::uint64_t{256}, std::uint64_t{0x80000000}, std::uint64_t{0xffffffff}, ~std::uint64_t{0}}) {
+    for (const std::uint64_t large : {std::uint64_t{200}, std::uint64_t{255}, std::uint64_t{256},
+                                      std::uint64_t{0x80000000}, std::uint64_t{0xffffffff}, ~std::uint64_t{0}}) {
         add(large, 3);
         add(3, large);
         add(large, large);
     }
     for (const Variant& variant : exact_variants()) {
-        const auto inserted = evaluate_one<Unsigned>(variant, call(&Math::bitfield_insert), base, insert, offset, count);
+        const auto inserted =
+            evaluate_one<Unsigned>(variant, call(&Math::bitfield_insert), base, insert, offset, count);
         const auto extracted = evaluate_one<Unsigned>(variant, call(&Math::bitfield_u_extract), base, offset, count);
         const auto extended = evaluate_one<Unsigned>(variant, call(&Math::bitfield_s_extract), base, offset, count);
         for (std::size_t i = 0; i < base.size(); ++i) {
@@ -252,7 +272,8 @@ void check_bit_fields(const std::vector<Unsigned>& samples) {
                 ASSERT_EQ(bit(inserted[i], b), in_field ? bit(insert[i], b - o) : bit(base[i], b))
                     << "insert " << o << " " << c << " bit " << b << "; " << variant.name();
                 const unsigned field_bit = b < c && o < bits ? bit(base[i], o + b) : 0;
-                ASSERT_EQ(bit(extracted[i], b), field_bit) << "extract " << o << " " << c << " bit " << b << "; " << variant.name();
+                ASSERT_EQ(bit(extracted[i], b), field_bit)
+                    << "extract " << o << " " << c << " bit " << b << "; " << variant.name();
                 const unsigned sign = c > 0 && o < bits ? bit(base[i], o + c - 1) : 0;
                 ASSERT_EQ(bit(extended[i], b), b < c ? field_bit : sign)
                     << "signed extract " << o << " " << c << " bit " << b << "; " << variant.name();

@@ -20,10 +20,12 @@ class Number : public testing::Test {
         std::vector<T> result(few_floats().begin(), few_floats().end());
         if constexpr (std::is_same_v<T, double>) {
             for (std::uint64_t i = 0; i < 200; ++i) result.push_back(std::bit_cast<double>(noise(i)));
-            for (const double x : {0x1p-1074, 0x1p-1022, 0x1.fffffffffffffp1023, 0x1p52, 0x1p53, 0x1p51, 4503599627370495.5, 0.49999999999999994})
+            for (const double x : {0x1p-1074, 0x1p-1022, 0x1.fffffffffffffp1023, 0x1p52, 0x1p53, 0x1p51,
+                                   4503599627370495.5, 0.49999999999999994})
                 for (const double sign : {1.0, -1.0}) result.push_back(sign * x);
         } else {
-            for (std::uint64_t i = 0; i < 200; ++i) result.push_back(std::bit_cast<float>(static_cast<std::uint32_t>(noise(i))));
+            for (std::uint64_t i = 0; i < 200; ++i)
+                result.push_back(std::bit_cast<float>(static_cast<std::uint32_t>(noise(i))));
             result.insert(result.end(), {0.49999997f, -0.49999997f, 8388607.5f, 4194303.5f, -4194303.5f});
         }
         return result;
@@ -35,8 +37,9 @@ class Number : public testing::Test {
         for (const Variant& variant : exact_variants()) {
             const std::vector<T> result = evaluate_one<T>(variant, emit, x);
             for (std::size_t i = 0; i < x.size(); ++i)
-                ASSERT_TRUE(same(result[i], T(expected(x[i])))) << name << "(" << x[i] << ") = " << result[i] << " and not "
-                                                               << expected(x[i]) << "; " << variant.name();
+                ASSERT_TRUE(same(result[i], T(expected(x[i]))))
+                    << name << "(" << x[i] << ") = " << result[i] << " and not " << expected(x[i]) << "; "
+                    << variant.name();
         }
     }
 
@@ -46,8 +49,9 @@ class Number : public testing::Test {
         for (const Variant& variant : exact_variants()) {
             const std::vector<T> result = evaluate_one<T>(variant, emit, x, y);
             for (std::size_t i = 0; i < x.size(); ++i)
-                ASSERT_TRUE(same(result[i], T(expected(x[i], y[i])))) << name << "(" << x[i] << ", " << y[i] << ") = " << result[i]
-                                                                     << " and not " << expected(x[i], y[i]) << "; " << variant.name();
+                ASSERT_TRUE(same(result[i], T(expected(x[i], y[i]))))
+                    << name << "(" << x[i] << ", " << y[i] << ") = " << result[i] << " and not " << expected(x[i], y[i])
+                    << "; " << variant.name();
         }
     }
 
@@ -138,10 +142,29 @@ void check_ldexp(const std::vector<T>& samples) {
     constexpr std::int64_t least = std::numeric_limits<Exponent>::min();
     constexpr std::int64_t most = std::numeric_limits<Exponent>::max();
     for (const T a : samples)
-        for (std::int64_t e : {std::int64_t{0}, std::int64_t{1}, std::int64_t{-1}, std::int64_t{23}, std::int64_t{-24}, std::int64_t{100},
-                               std::int64_t{-101}, std::int64_t{-126}, std::int64_t{127}, std::int64_t{128}, std::int64_t{-149}, std::int64_t{-150},
-                               std::int64_t{277}, std::int64_t{-278}, std::int64_t{1000}, std::int64_t{-1060}, std::int64_t{2098}, std::int64_t{-2099},
-                               std::int64_t{70000}, std::int64_t{-70000}, std::int64_t{1} << 33, least, most}) {
+        for (std::int64_t e : {std::int64_t{0},
+                               std::int64_t{1},
+                               std::int64_t{-1},
+                               std::int64_t{23},
+                               std::int64_t{-24},
+                               std::int64_t{100},
+                               std::int64_t{-101},
+                               std::int64_t{-126},
+                               std::int64_t{127},
+                               std::int64_t{128},
+                               std::int64_t{-149},
+                               std::int64_t{-150},
+                               std::int64_t{277},
+                               std::int64_t{-278},
+                               std::int64_t{1000},
+                               std::int64_t{-1060},
+                               std::int64_t{2098},
+                               std::int64_t{-2099},
+                               std::int64_t{70000},
+                               std::int64_t{-70000},
+                               std::int64_t{1} << 33,
+                               least,
+                               most}) {
             if (e < least || e > most) continue;
             x.push_back(a);
             exponents.push_back(static_cast<Exponent>(e));
@@ -151,8 +174,8 @@ void check_ldexp(const std::vector<T>& samples) {
         for (std::size_t i = 0; i < x.size(); ++i) {
             const std::int64_t bounded = std::clamp<std::int64_t>(exponents[i], -10000, 10000);
             const T expected = std::ldexp(x[i], static_cast<int>(bounded));
-            ASSERT_TRUE(same(result[i], expected)) << x[i] << " * 2^" << +exponents[i] << " = " << result[i] << " and not " << expected
-                                                   << "; " << variant.name();
+            ASSERT_TRUE(same(result[i], expected)) << x[i] << " * 2^" << +exponents[i] << " = " << result[i]
+                                                   << " and not " << expected << "; " << variant.name();
         }
     }
 }
@@ -177,7 +200,8 @@ TYPED_TEST(Number, is_compared) {
         const T raised = x > low ? x : low;
         return raised < high ? raised : high;
     });
-    this->check_three("n_clamp", call(&Math::n_clamp), [&](T x, T low, T high) { return number_min(number_max(x, low), high); });
+    this->check_three("n_clamp", call(&Math::n_clamp),
+                      [&](T x, T low, T high) { return number_min(number_max(x, low), high); });
 }
 
 TYPED_TEST(Number, is_interpolated) {
@@ -200,8 +224,10 @@ TYPED_TEST(Number, has_remainders) {
 template <typename T, typename Integer>
 void check_float_to_int(const std::vector<T>& samples) {
     std::vector<T> x = samples;
-    for (const T edge : {static_cast<T>(std::numeric_limits<Integer>::min()), static_cast<T>(std::numeric_limits<Integer>::max())})
-        for (const T near : {edge, std::nextafter(edge, T(0)), std::nextafter(edge, std::numeric_limits<T>::infinity()), edge + T(0.5), edge - T(0.5)})
+    for (const T edge :
+         {static_cast<T>(std::numeric_limits<Integer>::min()), static_cast<T>(std::numeric_limits<Integer>::max())})
+        for (const T near : {edge, std::nextafter(edge, T(0)), std::nextafter(edge, std::numeric_limits<T>::infinity()),
+                             edge + T(0.5), edge - T(0.5)})
             x.push_back(near);
     const auto emit = [](Math& math, Values values) {
         return std::vector<llvm::Value*>{math.float_to_int(values[0], 8 * sizeof(Integer), std::is_signed_v<Integer>)};
@@ -210,10 +236,11 @@ void check_float_to_int(const std::vector<T>& samples) {
     for (const Variant& variant : exact_variants()) {
         const std::vector<Integer> result = evaluate_one<Integer>(variant, emit, x);
         for (std::size_t i = 0; i < x.size(); ++i) {
-            const Integer expected = std::isnan(x[i])   ? Integer{0}
-                                     : x[i] >= above    ? std::numeric_limits<Integer>::max()
-                                     : x[i] <= static_cast<T>(std::numeric_limits<Integer>::min()) ? std::numeric_limits<Integer>::min()
-                                                        : static_cast<Integer>(x[i]);
+            const Integer expected = std::isnan(x[i]) ? Integer{0}
+                                     : x[i] >= above  ? std::numeric_limits<Integer>::max()
+                                     : x[i] <= static_cast<T>(std::numeric_limits<Integer>::min())
+                                         ? std::numeric_limits<Integer>::min()
+                                         : static_cast<Integer>(x[i]);
             ASSERT_EQ(+result[i], +expected) << x[i] << "; " << sizeof(Integer) << " bytes; " << variant.name();
         }
     }
@@ -242,7 +269,8 @@ void check_int_to_float() {
     };
     for (const Variant& variant : exact_variants()) {
         const std::vector<T> result = evaluate_one<T>(variant, emit, x);
-        for (std::size_t i = 0; i < x.size(); ++i) ASSERT_EQ(result[i], static_cast<T>(x[i])) << +x[i] << "; " << variant.name();
+        for (std::size_t i = 0; i < x.size(); ++i)
+            ASSERT_EQ(result[i], static_cast<T>(x[i])) << +x[i] << "; " << variant.name();
     }
 }
 

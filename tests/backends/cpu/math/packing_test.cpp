@@ -20,7 +20,8 @@ std::vector<float> components() {
             const auto x = static_cast<float>((i / 2.0) / steps);
             for (const float near : {x, std::nextafter(x, 2.0f), std::nextafter(x, -2.0f)}) result.push_back(near);
         }
-    for (std::uint64_t i = 0; i < 20000; ++i) result.push_back(static_cast<float>(static_cast<double>(noise(i) % 4000001) / 1e6 - 2));
+    for (std::uint64_t i = 0; i < 20000; ++i)
+        result.push_back(static_cast<float>(static_cast<double>(noise(i) % 4000001) / 1e6 - 2));
     return result;
 }
 
@@ -66,8 +67,10 @@ TEST(Packing, of_four_normalized_bytes_follows_the_definition) {
             const auto result = evaluate_one<std::uint32_t>(variant, emit, x, y, z, w);
             for (std::size_t i = 0; i < x.size(); ++i) {
                 const std::uint32_t expected = normalized(x[i], 8, is_signed) | normalized(y[i], 8, is_signed) << 8 |
-                                               normalized(z[i], 8, is_signed) << 16 | normalized(w[i], 8, is_signed) << 24;
-                ASSERT_EQ(result[i], expected) << x[i] << " " << y[i] << " " << z[i] << " " << w[i] << "; " << variant.name();
+                                               normalized(z[i], 8, is_signed) << 16 |
+                                               normalized(w[i], 8, is_signed) << 24;
+                ASSERT_EQ(result[i], expected)
+                    << x[i] << " " << y[i] << " " << z[i] << " " << w[i] << "; " << variant.name();
             }
         }
 }
@@ -95,7 +98,8 @@ TEST(Packing, of_doubles_and_halves_goes_through_single) {
         const auto halves = evaluate_one<std::uint32_t>(variant, pack(&Math::pack_half2x16), x, y);
         const auto low = evaluate_one<std::uint16_t>(variant, call(&Math::float_to_half), x);
         const auto high = evaluate_one<std::uint16_t>(variant, call(&Math::float_to_half), y);
-        for (std::size_t i = 0; i < x.size(); ++i) ASSERT_EQ(halves[i], low[i] | static_cast<std::uint32_t>(high[i]) << 16);
+        for (std::size_t i = 0; i < x.size(); ++i)
+            ASSERT_EQ(halves[i], low[i] | static_cast<std::uint32_t>(high[i]) << 16);
     }
 }
 
@@ -105,14 +109,20 @@ TEST(Packing, is_undone_as_division_rounds) {
     for (const Variant& variant : exact_variants()) {
         const auto [u0, u1] = evaluate<float, float>(variant, unpack(&Math::unpack_unorm2x16), words);
         const auto [s0, s1] = evaluate<float, float>(variant, unpack(&Math::unpack_snorm2x16), words);
-        const auto [v0, v1, v2, v3] = evaluate<float, float, float, float>(variant, unpack(&Math::unpack_unorm4x8), words);
-        const auto [t0, t1, t2, t3] = evaluate<float, float, float, float>(variant, unpack(&Math::unpack_snorm4x8), words);
+        const auto [v0, v1, v2, v3] =
+            evaluate<float, float, float, float>(variant, unpack(&Math::unpack_unorm4x8), words);
+        const auto [t0, t1, t2, t3] =
+            evaluate<float, float, float, float>(variant, unpack(&Math::unpack_snorm4x8), words);
         for (std::size_t i = 0; i < words.size(); ++i) {
             const std::uint32_t word = words[i];
             const auto u16 = [&](unsigned at) { return static_cast<float>(word >> at & 0xffff) / 65535.0f; };
-            const auto s16 = [&](unsigned at) { return std::max(-1.0f, static_cast<float>(static_cast<std::int16_t>(word >> at)) / 32767.0f); };
+            const auto s16 = [&](unsigned at) {
+                return std::max(-1.0f, static_cast<float>(static_cast<std::int16_t>(word >> at)) / 32767.0f);
+            };
             const auto u8 = [&](unsigned at) { return static_cast<float>(word >> at & 0xff) / 255.0f; };
-            const auto s8 = [&](unsigned at) { return std::max(-1.0f, static_cast<float>(static_cast<std::int8_t>(word >> at)) / 127.0f); };
+            const auto s8 = [&](unsigned at) {
+                return std::max(-1.0f, static_cast<float>(static_cast<std::int8_t>(word >> at)) / 127.0f);
+            };
             ASSERT_EQ(u0[i], u16(0)) << variant.name() << std::hex << word;
             ASSERT_EQ(u1[i], u16(16)) << variant.name() << std::hex << word;
             ASSERT_EQ(s0[i], s16(0)) << variant.name() << std::hex << word;
@@ -131,7 +141,8 @@ TEST(Packing, is_undone_as_division_rounds) {
         for (const std::uint32_t word : words) high.push_back(static_cast<std::uint16_t>(word >> 16));
         const auto low_half = evaluate_one<float>(variant, call(&Math::half_to_float), words);
         const auto high_half = evaluate_one<float>(variant, call(&Math::half_to_float), high);
-        for (std::size_t i = 0; i < words.size(); ++i) ASSERT_TRUE(same(h0[i], low_half[i]) && same(h1[i], high_half[i]));
+        for (std::size_t i = 0; i < words.size(); ++i)
+            ASSERT_TRUE(same(h0[i], low_half[i]) && same(h1[i], high_half[i]));
     }
 }
 
@@ -147,7 +158,8 @@ TEST(Packing, of_a_double_in_two_words_keeps_every_bit) {
     }
     for (const Variant& variant : exact_variants()) {
         EXPECT_EQ(evaluate_one<double>(variant, pack(&Math::pack_double2x32), low, high), numbers) << variant.name();
-        const auto [first, second] = evaluate<std::uint32_t, std::uint32_t>(variant, unpack(&Math::unpack_double2x32), numbers);
+        const auto [first, second] =
+            evaluate<std::uint32_t, std::uint32_t>(variant, unpack(&Math::unpack_double2x32), numbers);
         EXPECT_EQ(first, low) << variant.name();
         EXPECT_EQ(second, high) << variant.name();
     }

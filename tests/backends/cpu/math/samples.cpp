@@ -20,12 +20,15 @@ std::vector<float> edges() {
             result.push_back(sign * std::nextafter(x, 0.0f));
         }
     };
-    for (const float x : {0.0f, 0x1p-149f, 0x1p-126f, 0x1p-24f, 0x1p-14f, 0.25f, 0.5f, 0.625f, 1.0f, 1.5f, 2.0f, 2.5f, 3.0f, 10.0f, 64.0f,
-                          88.72284f, 89.416f, 104.0f, 127.0f, 128.0f, 149.0f, 150.0f, 255.5f, 32767.5f, 65504.0f, 65519.996f, 65520.0f,
-                          0x1p20f, 0x1p22f, 0x1p23f, 0x1p24f, 0x1p31f, 0x1p32f, 0x1p63f, 0x1p64f, 1e30f, 0x1.fffffep127f})
+    for (const float x :
+         {0.0f,    0x1p-149f, 0x1p-126f, 0x1p-24f, 0x1p-14f, 0.25f,      0.5f,           0.625f,  1.0f,    1.5f,
+          2.0f,    2.5f,      3.0f,      10.0f,    64.0f,    88.72284f,  89.416f,        104.0f,  127.0f,  128.0f,
+          149.0f,  150.0f,    255.5f,    32767.5f, 65504.0f, 65519.996f, 65520.0f,       0x1p20f, 0x1p22f, 0x1p23f,
+          0x1p24f, 0x1p31f,   0x1p32f,   0x1p63f,  0x1p64f,  1e30f,      0x1.fffffep127f})
         add(x);
     for (int i = 1; i < 40; ++i) add(static_cast<float>(i * std::numbers::pi / 4));
-    for (const std::uint32_t bits : {0x7f800000u, 0xff800000u, 0x7fc00000u, 0xffc00000u, 0x7fc12345u, 0x7f800001u, 0xffffffffu, 0x7fbfffffu})
+    for (const std::uint32_t bits :
+         {0x7f800000u, 0xff800000u, 0x7fc00000u, 0xffc00000u, 0x7fc12345u, 0x7f800001u, 0xffffffffu, 0x7fbfffffu})
         result.push_back(std::bit_cast<float>(bits));
     return result;
 }
@@ -64,7 +67,8 @@ const std::vector<float>& many_floats() {
 const std::vector<float>& few_floats() {
     static const std::vector<float> floats = [] {
         std::vector<float> result = edges();
-        for (std::uint64_t i = 0; i < 100; ++i) result.push_back(static_cast<float>(static_cast<double>(noise(i) % 20001) / 1000 - 10));
+        for (std::uint64_t i = 0; i < 100; ++i)
+            result.push_back(static_cast<float>(static_cast<double>(noise(i) % 20001) / 1000 - 10));
         pad(result);
         return result;
     }();
