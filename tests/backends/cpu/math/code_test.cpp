@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <sstream>
+#include <string>
+
+#include "tests/backends/cpu/math/evaluate.h"
+
+// What the functions become on a machine with vectors of 16 lanes.
+
+namespace nacre::cpu {
+namespace {
+
+struct Code {
+    unsigned instructions = 0;
+    bool has_calls = false;
+};
+
+Code code_of(const Variant& variant, const std::vector<Kind>& inputs, const Emit& emit) {
+    Code code;
+    std::istringstream lines(assembly(variant, inputs, emit));
+    for (std::string line; std::getline(lines, line);) {
+        if (line.size() < 2 || line[0] != '\t' || line[1] == '.' || line[1] == '#') continue;
+        if (line.starts_with("\tretq")) continue;
+        if (line.starts_with("\tcall") || line.starts_with("\tjmp")) code.has_calls = true;
+        ++code.instructions;
+    }
+    return code;
+}
+
+TEST(Code, of_sixteen_lanes_is_short_and_calls_nothing) {
+    const struct {
+        const char* name;
+        Emit emit;
+        std::vector<Kind> inputs;
+        unsigned most;  ///< Instructions, without contraction.
+    } functions[] = {
+        {"sin", call(&Math::sin), {Kind::single}, 30},
+        {"cos", call(&Math::cos), {Kind::single}, 32},
+        {"tan", call(&Math::tan), {Kind::single}, 42},
+        {"asin", call(&Math::asin), {Kind::single}, 30},
+        {"acos", call(&Math::acos), {Kind::single}, 34},
+        {"atan", call(&Math::atan), {Kind::single}, 32},
+        {"atan2", call(&Math::atan2), {Kind::single, Kind::single}, 44},
+        {"sinh", call(&Math::sinh), {Kind::single}, 48},
+        {"tanh", call(&Math::tanh), {Kind::single}, 50},
+        {"exp", call(&Math::exp), {Kind::single}, 32},
+        {"exp2", call(&Math::exp2), {Kind::single}, 28},
+        {"log", call(&Math::log), {Kind::single}, 50},
+        {"log2", call(&Math::log2), {Kind::single}, 42},
+        {"pow", call(&Math::pow), {Kind::single, Kind::single}, 75},
+        {"inverse_sqrt", call(&Math::inverse_sqrt), {Kind::single}, 4},
+        {"float_to_half", call(&Math::float_to_half), {Kind::single}, 30},
+        {"half_to_float", call(&Math::half_to_float), {Kind::int32}, 20},
+        {"round", call(&Math::round), {Kind::single}, 4},
+        {"s_div", call(&Math::s_div), {Kind::int32, Kind::int32}, 24},
+        {"u_mod", call(&Math::u_mod), {Kind::int32, Kind::int32}, 24},
+        {"find_u_msb", call(&Math::find_u_msb), {Kind::int32}, 3},
+        {"bit_reverse", call(&Math::bit_reverse), {Kind::int32}, 12},
+    };
+    for (const auto& function : functions) {
+        const Code code = code_of({.processor = "x86-64-v4"}, function.inputs, function.emit);
+        const Code contracted =
+            code_of({.processor = "x86-64-v4", .options = {.contract = true, .half_instructions = true}},
+                    function.inputs, function.emit);
+        EXPECT_LE(code.instructions, function.most) << function.name;
+        EXPECT_LE(contracted.instructions, code.instructions) << function.name;
+        EXPECT_FALSE(code.has_calls || contracted.has_calls) << function.name;
+        std::printf("%s: %u, %u\n", function.name, code.instructions, contracted.instructions);
+    }
+}
+
+}  // namespace
+}  // namespace nacre::cpu
