@@ -63,7 +63,10 @@ float decode_small_float(std::uint32_t bits, std::uint32_t mantissa_bits) {
 }
 std::uint32_t encode_small_float(float value, std::uint32_t mantissa_bits) {
     const std::uint32_t infinity = 31u << mantissa_bits;
-    if (std::isnan(value)) return infinity | (1u << (mantissa_bits - 1));
+    if (std::isnan(value)) {
+        const std::uint32_t payload = std::bit_cast<std::uint32_t>(value) >> (23 - mantissa_bits) & ((1u << mantissa_bits) - 1);
+        return infinity | (1u << (mantissa_bits - 1)) | payload;
+    }
     if (!(value > 0.0f)) return 0;
     if (std::isinf(value)) return infinity;
     // Below 2^-14 values are multiples of the smallest one.
