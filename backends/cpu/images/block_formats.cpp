@@ -15,21 +15,20 @@ std::uint64_t read_bits(const std::byte* from) {
     return value;
 }
 
-// Nearest 8-bit code of (numerator / denominator); both weights of an interpolation go into the numerator.
-std::uint32_t nearest_code(std::uint32_t numerator, std::uint32_t denominator) {
-    return (numerator * 255 * 2 + denominator) / (2 * denominator);
-}
-
 std::uint32_t pack(std::uint32_t red, std::uint32_t green, std::uint32_t blue, std::uint32_t alpha) {
     return red | (green << 8) | (blue << 16) | (alpha << 24);
 }
 
 // Color weights `a` and `b` of two 5:6:5 colors.
 std::uint32_t mix_colors(std::uint32_t color0, std::uint32_t color1, std::uint32_t a, std::uint32_t b) {
-    const auto channel = [&](std::uint32_t shift, std::uint32_t most) {
-        return nearest_code(a * ((color0 >> shift) & most) + b * ((color1 >> shift) & most), (a + b) * most);
+    const auto channel = [&](std::uint32_t shift, std::uint32_t bits) {
+        const auto widen = [&](std::uint32_t color) {
+            const std::uint32_t code = (color >> shift) & ((1u << bits) - 1);
+            return (code << (8 - bits)) | (code >> (2 * bits - 8));
+        };
+        return (a * widen(color0) + b * widen(color1) + (a + b) / 2) / (a + b);
     };
-    return pack(channel(11, 31), channel(5, 63), channel(0, 31), 255);
+    return pack(channel(11, 5), channel(5, 6), channel(0, 5), 255);
 }
 
 void decode_color_block(const std::byte* block, bool always_four_colors, std::uint32_t (&texels)[16]) {

@@ -25,8 +25,8 @@ struct Texel {
 ///
 /// Reads `rhi::info(format).block_bytes` bytes, for formats with stencil the four bytes of the depth plane (see image_view.h).
 /// Sources: Vulkan specification ("Conversion From Normalized Fixed-Point", "16-Bit Floating-Point Numbers" and its kin) and
-/// Khronos Data Format Specification (compressed formats). Colors of BC1 to BC3 are rounded to 8 bits, as decoders in hardware do;
-/// all other formats are decoded exactly (one rounding to float).
+/// Khronos Data Format Specification (compressed formats). Colors of BC1 to BC3 are widened to 8 bits before
+/// they are mixed, and the mix is rounded to 8 bits, as is usual; all other formats are decoded exactly (one rounding to float).
 Texel decode_texel(rhi::Format format, const std::byte* block, std::uint32_t x_in_block = 0, std::uint32_t y_in_block = 0);
 
 /// Writes the bits that stand for `texel`, as many as `decode_texel` reads. Fixed-point channels are clamped and rounded to nearest
