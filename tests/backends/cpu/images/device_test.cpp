@@ -204,6 +204,37 @@ class EveryShape : public DeviceComparison, public testing::WithParamInterface<S
         EXPECT_LE(found.count, allowed) << "of " << points.size() << "; first:\n  "
                                         << describe(sampler, points[found.first], ours[found.first], theirs[found.first]);
     }
+    // The driver takes log2(x) of a squared length as floor(log2(x)) + x / 2^floor(log2(x)) - 1, which is too small by up to 0.0861: its
+    // level of detail is too small by up to half of that. Its result must lie between those that we get inside of this range.
+    void compare_with_bias(const TestImage& image, rhi::SamplerDesc sampler, const Request& request, const std::string& expression,
+                           const std::vector<Point>& points, std::size_t allowed) {
+        const auto theirs = oracle->evaluate(image, sampler, expression, points);
+        std::vector<std::vector<Result>> ours;
+        const float bias = sampler.mip_bias;
+        constexpr int steps = 33;
+        for (int i = 0; i < steps; ++i) {
+            sampler.mip_bias = bias - 0.0432f * static_cast<float>(i) / (steps - 1);
+            ours.push_back(run(image, sampler, request, points));
+        }
+        std::size_t count = 0, first = 0;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            bool fits = true;
+            for (int c = 0; c < 4; ++c) {
+                float low = 1e30f, high = -1e30f;
+                for (const auto& each : ours) {
+                    low = std::min(low, std::bit_cast<float>(each[i][c]));
+                    high = std::max(high, std::bit_cast<float>(each[i][c]));
+                }
+                const float value = std::bit_cast<float>(theirs[i][c]);
+                fits = fits && value >= low - 1e-3f && value <= high + 1e-3f;
+            }
+            if (!fits && count++ == 0) first = i;
+        }
+        outside += count;
+        EXPECT_LE(count, allowed) << "of " << points.size() << "; first:\n  "
+                                  << describe(sampler, points[first], ours[0][first], theirs[first]) << "\n  ours with bias "
+                                  << std::bit_cast<float>(ours.back()[first][0]);
+    }
     double largest = 0.0;
     std::size_t outside = 0;
 };
@@ -221,6 +252,149 @@ TEST_P(EveryShape, SamplesWithExplicitLod) {
         }
     }
     std::printf("largest difference %g, outside %zu\n", largest, outside);
+}
+
+TEST_P(EveryShape, SamplesWithGradients) {
+    const SampleCase shape = GetParam();
+    const std::uint32_t mips = std::min(4u, rhi::full_mip_count(shape.width, shape.height, shape.depth));
+    const std::uint32_t axes = spatial_axes(shape.dimension);
+    const std::string cut = std::string(".") + std::string("xyz").substr(0, axes);
+    for (int i = 0; i < 10; ++i) {
+        const TestImage image({Format::rgba8_unorm, shape.dimension, shape.width, shape.height, shape.depth, shape.layers, mips}, random);
+        compare_with_bias(image, random_sampler(random), {.flags = flags_of(ImageOperation::sample) | image_lod_gradient},
+                "textureGrad(image, " + swizzle(coordinate_count(shape.dimension)) + ", gx" + cut + ", gy" + cut + ")",
+                random_points(random, shape, 1000), 3);
+    }
+    std::printf("largest difference %g, outside %zu\n", largest, outside);
+}
+
+TEST_P(EveryShape, FetchesFromEveryMipAndLayer) {
+    const SampleCase shape = GetParam();
+    if (shape.dimension == ViewDimension::cube || shape.dimension == ViewDimension::cube_array) GTEST_SKIP() << "GLSL has no fetch from cubes";
+    const std::uint32_t mips = std::min(3u, rhi::full_mip_count(shape.width, shape.height, shape.depth));
+    const std::string components = std::string("ip.") + std::string("xyz").substr(0, coordinate_count(shape.dimension));
+    for (const Format format : {Format::r32_uint, Format::rgba8_unorm, Format::rg16_sint, Format::r32_float}) {
+        const TestImage image({format, shape.dimension, shape.width, shape.height, shape.depth, shape.layers, mips}, random);
+        std::vector<Point> points(2000);
+        const bool is_array = shape.layers > 1;
+        for (Point& point : points) {
+            const std::uint32_t mip = random_below(random, mips);
+            point.lod = std::bit_cast<float>(mip);
+            const ImageLevel& level = image.view.levels[mip];
+            point.coordinates[0] = random_below(random, level.width);
+            if (shape.dimension == ViewDimension::d1_array) point.coordinates[1] = random_below(random, shape.layers);
+            else point.coordinates[1] = random_below(random, level.height);
+            point.coordinates[2] = random_below(random, is_array ? shape.layers : level.depth);
+        }
+        Request request{.flags = flags_of(ImageOperation::fetch)};
+        if (rhi::info(format).is_integer()) request.flags |= image_integer;
+        const auto ours = run(image, nearest(), request, points);
+        const auto theirs = oracle->evaluate(image, nearest(), "texelFetch(image, " + components + ", floatBitsToInt(lod))", points);
+        if (rhi::info(format).is_integer()) EXPECT_EQ(ours, theirs);
+        else EXPECT_LE(largest_difference(ours, theirs), 2e-7);
+    }
+}
+
+TEST_P(EveryShape, ComparesDepths) {
+    const SampleCase shape = GetParam();
+    using enum ViewDimension;
+    if (shape.dimension == d3) GTEST_SKIP() << "no depth textures of three dimensions";
+    std::string expression;
+    switch (shape.dimension) {
+        case d1: expression = "textureGrad(image, vec3(p.x, 0, reference), gx.x, gy.x)"; break;
+        case d1_array: expression = "textureGrad(image, vec3(p.xy, reference), gx.x, gy.x)"; break;
+        case d2: expression = "textureGrad(image, vec3(p.xy, reference), gx.xy, gy.xy)"; break;
+        case d2_array: expression = "textureGrad(image, vec4(p.xyz, reference), gx.xy, gy.xy)"; break;
+        case cube: expression = "textureGrad(image, vec4(p.xyz, reference), gx, gy)"; break;
+        default: expression = "texture(image, p, reference)"; break;
+    }
+    const bool is_cube_array = shape.dimension == cube_array;
+    for (const Format format : {Format::d32_float, Format::d16_unorm}) {
+        for (std::uint32_t operation = 0; operation < 8; ++operation) {
+            const TestImage image({format, shape.dimension, shape.width, shape.height, shape.depth, shape.layers, is_cube_array ? 1u : 3u}, random);
+            rhi::SamplerDesc sampler = random_sampler(random);
+            sampler.comparison = true;
+            sampler.compare = static_cast<rhi::CompareOperation>(operation);
+            if (!oracle->device()->capabilities().supports(format, rhi::FormatSupport::filtered)) {
+                sampler.magnify = sampler.minify = sampler.mip = rhi::Filter::nearest;
+            }
+            if (is_cube_array) sampler.minify = sampler.magnify;
+            compare_with_bias(image, sampler,
+                    {.flags = flags_of(ImageOperation::sample) | image_compare | (is_cube_array ? image_lod_explicit : image_lod_gradient)},
+                    "vec4(" + expression + ", 0, 0, 1)", [&] {
+                        auto points = random_points(random, shape, 1000);
+                        if (is_cube_array) for (Point& point : points) point.lod = 0.0f;
+                        return points;
+                    }(), 5);
+        }
+    }
+    std::printf("largest difference %g, outside %zu\n", largest, outside);
+}
+
+TEST_P(EveryShape, Gathers) {
+    const SampleCase shape = GetParam();
+    using enum ViewDimension;
+    if (shape.dimension == d1 || shape.dimension == d1_array || shape.dimension == d3) GTEST_SKIP() << "GLSL has no gather there";
+    const std::string coordinates = swizzle(coordinate_count(shape.dimension));
+    for (std::uint32_t component = 0; component < 4; ++component) {
+        for (const Format format : {Format::rgba8_unorm, Format::rg16_float}) {
+            const TestImage image({format, shape.dimension, shape.width, shape.height, shape.depth, shape.layers, 1}, random);
+            const std::uint32_t flags = flags_of(ImageOperation::gather) | (component << image_component_shift);
+            compare(image, random_sampler(random), {.flags = flags},
+                    "textureGather(image, " + coordinates + ", " + std::to_string(component) + ")", random_points(random, shape, 1000),
+                    2e-7, 6);
+        }
+    }
+    const TestImage depth({Format::d32_float, shape.dimension, shape.width, shape.height, shape.depth, shape.layers, 1}, random);
+    rhi::SamplerDesc sampler = random_sampler(random);
+    sampler.comparison = true;
+    if (!oracle->device()->capabilities().supports(Format::d32_float, rhi::FormatSupport::filtered)) {
+        sampler.magnify = sampler.minify = sampler.mip = rhi::Filter::nearest;
+    }
+    compare(depth, sampler, {.flags = flags_of(ImageOperation::gather) | image_compare},
+            "textureGather(image, " + coordinates + ", reference)", random_points(random, shape, 1000), 2e-7, 6);
+}
+
+TEST_F(DeviceComparison, AppliesOffsets) {
+    for (std::uint32_t mode = 0; mode < 4; ++mode) {
+        for (const bool is_linear : {true, false}) {
+            const SampleCase shape{"", ViewDimension::d2, 11, 6, 1, 1};
+            const TestImage image({Format::rgba8_unorm, shape.dimension, shape.width, shape.height, 1, 1, 3}, random);
+            rhi::SamplerDesc sampler = is_linear ? rhi::SamplerDesc{} : nearest();
+            sampler.address_u = sampler.address_v = static_cast<rhi::AddressMode>(mode);
+            std::vector<Point> points = random_points(random, shape, 1000);
+            for (Point& point : points) point.offset = {7, -8, 0};
+            auto ours = run(image, sampler, {.flags = flags_of(ImageOperation::sample) | image_lod_explicit | image_offset}, points);
+            auto theirs = oracle->evaluate(image, sampler, "textureLodOffset(image, p.xy, lod, ivec2(7, -8))", points);
+            EXPECT_LE(differences(ours, theirs, 1e-5).count, 2u) << "address mode " << mode << " linear " << is_linear;
+            for (Point& point : points) point.offset = {static_cast<int>(random_below(random, 16)) - 8, static_cast<int>(random_below(random, 16)) - 8, 0};
+            ours = run(image, sampler, {.flags = flags_of(ImageOperation::gather) | image_offset}, points);
+            theirs = oracle->evaluate(image, sampler, "textureGatherOffset(image, p.xy, offset.xy)", points);
+            EXPECT_LE(differences(ours, theirs, 2e-7).count, 2u) << "address mode " << mode << ", gather";
+            Request request{.flags = flags_of(ImageOperation::gather) | image_offsets};
+            request.gather_offsets = {{{-8, 7}, {0, 1}, {3, 3}, {-2, -5}}};
+            ours = run(image, sampler, request, points);
+            theirs = oracle->evaluate(image, sampler,
+                                      "textureGatherOffsets(image, p.xy, ivec2[4](ivec2(-8, 7), ivec2(0, 1), ivec2(3, 3), ivec2(-2, -5)))", points);
+            EXPECT_LE(differences(ours, theirs, 2e-7).count, 2u) << "address mode " << mode << ", gather of four offsets";
+        }
+    }
+}
+
+TEST_F(DeviceComparison, SamplesBlocks) {
+    const SampleCase shape{"", ViewDimension::d2, 61, 42, 1, 1};
+    for (std::uint32_t f = 1; f < rhi::format_count; ++f) {
+        const auto format = static_cast<Format>(f);
+        if (!rhi::info(format).is_compressed()) continue;
+        if (!oracle->device()->capabilities().supports(format, rhi::FormatSupport::filtered)) continue;
+        // Halves of random blocks are so large and small that sums of them tell nothing: BC6H is covered by fetches.
+        if (format == Format::bc6h_rgb_sfloat || format == Format::bc6h_rgb_ufloat) continue;
+        const TestImage image({format, shape.dimension, shape.width, shape.height, 1, 1, 4}, random);
+        const std::vector<Point> points = random_points(random, shape, 1000);
+        const auto ours = run(image, {}, {.flags = flags_of(ImageOperation::sample) | image_lod_explicit}, points);
+        const auto theirs = oracle->evaluate(image, {}, "textureLod(image, p.xy, lod)", points);
+        EXPECT_LE(largest_difference(ours, theirs), decoding_tolerance(format) + 1e-5) << rhi::info(format).name;
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(Shapes, EveryShape, testing::ValuesIn(shapes), [](const auto& each) { return std::string(each.param.name); });
