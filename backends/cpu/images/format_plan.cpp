@@ -34,7 +34,7 @@ ChannelCoding coding_of(FormatKind kind, std::uint32_t bits) {
 FormatPlan make_plan(Format format) {
     const rhi::FormatInfo& facts = rhi::info(format);
     FormatPlan plan;
-    if (format == Format::undefined) return plan;
+    if (facts.channels == 0) return plan;
     plan.texel_bytes = facts.block_bytes;
     plan.channel_count = facts.channels;
     plan.is_integer = facts.is_integer();

@@ -132,7 +132,7 @@ struct Shape {
 };
 Shape shape(Format format) {
     const rhi::FormatInfo& facts = rhi::info(format);
-    if (format == Format::undefined) return {Layout::none};
+    if (facts.channels == 0) return {Layout::none};
     if (facts.is_compressed() || facts.is_depth_stencil()) return {Layout::packed};
     switch (format) {
         case Format::rgb10a2_unorm: case Format::rgb10a2_uint: case Format::rg11b10_float: case Format::rgb9e5_float:

@@ -107,8 +107,8 @@ NACRE_INLINE Floats<W> fraction(Floats<W> x) {
     return small - floor_small<W>(small);
 }
 
-/// Logarithm to base 2 within 2e-7 + 1 ulp; 0 gives -infinity, infinity gives a large value. x >= 0 or NaN (which gives NaN or
-/// anything: callers clamp).
+/// Logarithm to base 2 within 2e-7 + 1 ulp; 0 and NaN (whose bits differ between machines) give -infinity, infinity gives 128.
+/// x >= 0.
 template <int W>
 NACRE_INLINE Floats<W> log2_lanes(Floats<W> x) {
     const Ints<W> bits = (Ints<W>)x;
@@ -120,7 +120,7 @@ NACRE_INLINE Floats<W> log2_lanes(Floats<W> x) {
     const Floats<W> series =
         t * (((((t2 * 0.32059889f) + 0.41219858f) * t2 + 0.57707802f) * t2 + 0.96179669f) * t2 + 2.8853901f);
     const Floats<W> result = to_floats<W>(exponent) + series;
-    return x < 1.17549435e-38f ? splat<W>(-__builtin_inff()) : result;
+    return x >= 1.17549435e-38f ? result : splat<W>(-__builtin_inff());
 }
 
 /// dFdx and dFdy inside of each quad.
