@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: Apache-2.0
+// Filtered reads: sample, gather, query of the level of detail.
+#pragma once
+
+#include "backends/cpu/images/kernels/level_of_detail.h"
+
+namespace nacre::cpu::NACRE_KERNEL_NAMESPACE {
+namespace {
+
+/// Red (and green, blue), alpha of a border.
+NACRE_INLINE void border_values(rhi::BorderColor color, float& rgb, float& alpha) {
+    rgb = color == rhi::BorderColor::opaque_white ? 1.0f : 0.0f;
+    alpha = color == rhi::BorderColor::transparent_black ? 0.0f : 1.0f;
+}
+
+/// Weighted mean of a footprint.
+template <int W, Codec C>
+[[gnu::noinline]] void filter_taps(const Source& source, const Taps<W>& taps, rhi::BorderColor border, Floats<W>* out) {
+    const FormatPlan& plan = *source.plan;
+    const int channels = raw_channels<C>(plan);
+    Floats<W> sum[4] = {};
+    for (int tap = 0; tap < taps.count; ++tap) {
+        Floats<W> texel[4];
+        load_raw<W, C>(source, taps.places[tap], texel);
+        if (taps.has_border) {
+            float rgb, alpha;
+            border_values(border, rgb, alpha);
+            for (int c = 0; c < channels; ++c) {
+                texel[c] = taps.is_border[tap] ? splat<W>((c == 3 ? alpha : rgb) * raw_scale<C>(plan, c)) : texel[c];
+            }
+        }
+        for (int c = 0; c < channels; ++c) sum[c] = sum[c] + taps.weights[tap] * texel[c];
+    }
+    for (int c = 0; c < channels; ++c) out[c] = sum[c];
+    finish_raw<W, C>(plan, out);
+}
+
+/// Texel of one tap, with the border in its place where it lies outside.
+template <int W>
+[[gnu::noinline]] void load_tap(const Source& source, const Taps<W>& taps, int tap, rhi::BorderColor border, Floats<W>* out) {
+    load_texels<W>(source, taps.places[tap], out);
+    if (!taps.has_border) return;
+    float rgb, alpha;
+    border_values(border, rgb, alpha);
+    const bool is_integer = source.plan->is_integer;
+    for (int c = 0; c < source.plan->channel_count; ++c) {
+        const float value = c == 3 ? alpha : rgb;
+        const Floats<W> color = is_integer ? (Floats<W>)splat<W>(static_cast<std::int32_t>(value)) : splat<W>(value);
+        out[c] = taps.is_border[tap] ? color : out[c];
+    }
+}
+
+/// 1 where the comparison holds, else 0.
+template <int W>
+NACRE_INLINE Floats<W> compare(rhi::CompareOperation operation, Floats<W> reference, Floats<W> depth) {
+    Ints<W> holds = splat<W>(0);
+    switch (operation) {
+        case rhi::CompareOperation::never: break;
+        case rhi::CompareOperation::less: holds = reference < depth; break;
+        case rhi::CompareOperation::equal: holds = reference == depth; break;
+        case rhi::CompareOperation::less_or_equal: holds = reference <= depth; break;
+        case rhi::CompareOperation::greater: holds = reference > depth; break;
+        case rhi::CompareOperation::not_equal: holds = reference != depth; break;
+        case rhi::CompareOperation::greater_or_equal: holds = reference >= depth; break;
+        case rhi::CompareOperation::always: holds = ~splat<W>(0); break;
+    }
+    return holds ? splat<W>(1.0f) : splat<W>(0.0f);
+}
+
+/// Everything that samples of one call have in common.
+template <int W>
+struct Sampling {
+    const Invocation* call;
+    const rhi::SamplerDesc* sampler;
+    int spatial;
+    bool is_cube;
+    Floats<W> coordinates[3];  ///< Cubes: the direction.
+    CubeProjection<W> cube;
+    Ints<W> slice;             ///< Layer; for cubes the slice of face 0.
+    Ints<W> offsets[3];
+    const Ints<W>* offset = nullptr;  ///< `offsets` where the call has some.
+    Floats<W> reference;
+};
+
+template <int W>
+NACRE_INLINE void prepare(const Invocation& call, Sampling<W>& sampling) {
+    const ImageArguments& arguments = *call.arguments;
+    const Axes axes = axes_of(call.image->dimension);
+    sampling.call = &call;
+    sampling.sampler = &call.sampler->desc;
+    sampling.spatial = axes.spatial;
+    sampling.is_cube = axes.is_cube;
+    for (int axis = 0; axis < axes.spatial; ++axis) sampling.coordinates[axis] = call.floats<W>(arguments.coordinates[axis]);
+    sampling.slice = splat<W>(0);
+    if (axes.has_layers) {
+        const Floats<W> layer = call.floats<W>(arguments.coordinates[axes.spatial]);
+        const std::uint32_t count = axes.is_cube ? call.image->layer_count / 6 : call.image->layer_count;
+        sampling.slice = array_layer<W>(layer, count) * (axes.is_cube ? 6 : 1);
+    }
+    if (axes.is_cube) sampling.cube = project_to_cube<W>(sampling.coordinates);
+    if (call.has(image_offset) && !axes.is_cube) {
+        for (int axis = 0; axis < axes.spatial; ++axis) sampling.offsets[axis] = call.ints<W>(arguments.offset[axis]);
+        sampling.offset = sampling.offsets;
+    }
+    if (call.has(image_compare)) {
+        sampling.reference = call.floats<W>(arguments.reference);
+        if (format_plan(call.image->format).is_fixed_point_depth) {
+            sampling.reference = clamp<W>(sampling.reference, splat<W>(0.0f), splat<W>(1.0f));
+        }
+    }
+}
+
+template <int W>
+NACRE_INLINE void footprint(const Sampling<W>& sampling, const Source& source, const Floats<W>* coordinates, bool is_linear,
+                            const Ints<W>* offset, Taps<W>& taps) {
+    if (sampling.is_cube) return make_cube_taps<W>(source, sampling.cube, sampling.slice, is_linear, taps);
+    const rhi::SamplerDesc& sampler = *sampling.sampler;
+    make_taps<W>(source, coordinates, sampling.slice, sampling.spatial, is_linear,
+                 {sampler.address_u, sampler.address_v, sampler.address_w}, offset, taps);
+}
+
+/// One isotropic sample of one level.
+template <int W>
+[[gnu::noinline]] void sample_once(const Sampling<W>& sampling, const Source& source, const Floats<W>* coordinates, bool is_linear,
+                                   Floats<W>* out) {
+    Taps<W> taps;
+    footprint<W>(sampling, source, coordinates, is_linear, sampling.offset, taps);
+    const rhi::BorderColor border = sampling.sampler->border;
+    if (sampling.call->has(image_compare)) {
+        Floats<W> sum = splat<W>(0.0f);
+        for (int tap = 0; tap < taps.count; ++tap) {
+            Floats<W> texel[4];
+            load_tap<W>(source, taps, tap, border, texel);
+            const Floats<W> passed = compare<W>(sampling.sampler->compare, sampling.reference, texel[0]);
+            sum = taps.count == 1 ? passed : sum + passed * taps.weights[tap];
+        }
+        out[0] = sum;
+        out[1] = out[2] = splat<W>(0.0f), out[3] = splat<W>(1.0f);
+    } else if (taps.count == 1) {
+        load_tap<W>(source, taps, 0, border, out);
+    } else {
+        visit_codec(source.codec, [&]<Codec C>() { filter_taps<W, C>(source, taps, border, out); });
+    }
+}
+
+/// One level with the filter's full footprint.
+template <int W>
+NACRE_INLINE void sample_level(const Sampling<W>& sampling, const LevelOfDetail<W>& detail, std::uint32_t level, bool is_linear,
+                               Floats<W>* out) {
+    Source source;
+    if (!make_source(*sampling.call->image, level, source)) {
+        for (int c = 0; c < 4; ++c) out[c] = splat<W>(0.0f);
+        return;
+    }
+    if (!detail.is_anisotropic) return sample_once<W>(sampling, source, sampling.coordinates, is_linear, out);
+    // Samples at i / (N + 1) - 1/2 of the longer axis, i = 1 ... N.
+    Floats<W> sum[4] = {};
+    for (int i = 1; i <= 16; ++i) {
+        const Ints<W> takes_part = detail.sample_count >= static_cast<float>(i);
+        if ((mask_bits<W>(takes_part) & sampling.call->live) == 0) break;
+        const Floats<W> along = static_cast<float>(i) / (detail.sample_count + 1.0f) - 0.5f;
+        Floats<W> moved[3];
+        for (int axis = 0; axis < 2; ++axis) {
+            moved[axis] = detail.sample_count > 1.0f ? sampling.coordinates[axis] + along * detail.axis[axis] : sampling.coordinates[axis];
+        }
+        Floats<W> once[4];
+        sample_once<W>(sampling, source, moved, is_linear, once);
+        for (int c = 0; c < 4; ++c) sum[c] = takes_part ? sum[c] + once[c] : sum[c];
+    }
+    for (int c = 0; c < 4; ++c) out[c] = sum[c] / detail.sample_count;
+}
+
+/// False where the result of every lane is zero.
+NACRE_INLINE bool can_sample(const Invocation& call) {
+    const ImageView& image = *call.image;
+    if (call.sampler == nullptr || image.mip_count == 0 || image.samples > 1 || image.layer_count == 0) return false;
+    const FormatPlan& plan = format_plan(image.format);
+    const Axes axes = axes_of(image.dimension);
+    if (axes.is_cube && image.layer_count < 6) return false;
+    return plan.codec != Codec::none && plan.is_integer == call.has(image_integer) && !(plan.is_integer && call.has(image_compare));
+}
+
+template <int W>
+[[gnu::noinline]] void sample_image(const Invocation& call) {
+    if (!can_sample(call)) return write_zeros<W>(call);
+    const ImageView& image = *call.image;
+    const rhi::SamplerDesc& sampler = call.sampler->desc;
+    const bool is_integer = call.has(image_integer);
+    Sampling<W> sampling;
+    prepare<W>(call, sampling);
+
+    LevelOfDetail<W> detail;
+    const bool magnifies_linearly = !is_integer && sampler.magnify == rhi::Filter::linear;
+    const bool minifies_linearly = !is_integer && sampler.minify == rhi::Filter::linear;
+    Ints<W> level = splat<W>(0), linear = magnifies_linearly ? ~splat<W>(0) : splat<W>(0);
+    Floats<W> next_weight = splat<W>(0.0f);
+    if (image.mip_count > 1 || magnifies_linearly != minifies_linearly || sampler.max_anisotropy > 1.0f) {
+        level_of_detail<W>(call, sampling.coordinates, sampling.is_cube ? &sampling.cube : nullptr, sampling.spatial, detail);
+        if (is_integer) detail.is_anisotropic = false;
+        select_levels<W>(detail.lambda, image.mip_count, !is_integer && sampler.mip == rhi::Filter::linear, level, next_weight);
+        if (magnifies_linearly != minifies_linearly) {
+            const Ints<W> magnified = detail.lambda <= 0.0f;
+            linear = magnifies_linearly ? magnified : ~magnified;
+        }
+    }
+
+    const std::uint32_t linear_bits = mask_bits<W>(linear) & call.live, nearest_bits = call.live & ~linear_bits;
+    const Ints<W> has_next = next_weight > 0.0f;
+    const std::uint32_t next_bits = mask_bits<W>(has_next) & call.live;
+    Floats<W> out[4];
+    const std::int32_t first = level[first_bit(call.live)];
+    if ((mask_bits<W>(level == first) & call.live) == call.live && next_bits == 0 && (linear_bits == 0 || nearest_bits == 0)) {
+        // All lanes read one level in the same way.
+        sample_level<W>(sampling, detail, static_cast<std::uint32_t>(first), linear_bits != 0, out);
+        return write_result<W>(call, out, mask_of_bits<W>(call.live));
+    }
+    for (int c = 0; c < 4; ++c) out[c] = splat<W>(0.0f);
+    // Every level once for all lanes that read it, from the finest on, so that a lane's sum does not depend on its neighbors.
+    std::uint32_t pending = call.live, pending_next = next_bits;
+    for (std::int32_t m = 0; (pending | pending_next) != 0; ++m) {
+        const Ints<W> is_first = level == m, is_next = (level == m - 1) & has_next;
+        const std::uint32_t here = (mask_bits<W>(is_first) & pending) | (mask_bits<W>(is_next) & pending_next);
+        if (here == 0) continue;
+        pending &= ~mask_bits<W>(is_first);
+        pending_next &= ~mask_bits<W>(is_next);
+        const Floats<W> weight = is_first ? 1.0f - next_weight : next_weight;
+        for (int filter = 0; filter < 2; ++filter) {
+            const std::uint32_t lanes = here & (filter == 0 ? nearest_bits : linear_bits);
+            if (lanes == 0) continue;
+            const Ints<W> mask = mask_of_bits<W>(lanes);
+            Floats<W> value[4];
+            sample_level<W>(sampling, detail, static_cast<std::uint32_t>(m), filter == 1, value);
+            for (int c = 0; c < 4; ++c) {
+                // Lanes that read one level only keep its bits as they are (integers too).
+                const Floats<W> sum = has_next ? out[c] + value[c] * weight : value[c];
+                out[c] = mask ? sum : out[c];
+            }
+        }
+    }
+    write_result<W>(call, out, mask_of_bits<W>(call.live));
+}
+
+/// The four texels of a linear footprint in the order (i0, j1), (i1, j1), (i1, j0), (i0, j0).
+template <int W>
+[[gnu::noinline]] void gather_image(const Invocation& call) {
+    Source source;
+    if (!can_sample(call) || !make_source(*call.image, 0, source)) return write_zeros<W>(call);
+    Sampling<W> sampling;
+    prepare<W>(call, sampling);
+    const std::uint32_t component = (call.flags >> image_component_shift) & 3;
+    const auto value_of = [&](const Taps<W>& taps, int tap) {
+        Floats<W> texel[4];
+        load_tap<W>(source, taps, tap, sampling.sampler->border, texel);
+        if (call.has(image_compare)) return compare<W>(sampling.sampler->compare, sampling.reference, texel[0]);
+        return texel[component];
+    };
+    constexpr int order[4] = {2, 3, 1, 0};
+    Floats<W> out[4];
+    Taps<W> taps;
+    if (call.has(image_offsets) && !sampling.is_cube) {
+        for (int i = 0; i < 4; ++i) {
+            for (int axis = 0; axis < 2; ++axis) sampling.offsets[axis] = splat<W>(call.arguments->gather_offsets[i][axis]);
+            sampling.offsets[2] = splat<W>(0);
+            footprint<W>(sampling, source, sampling.coordinates, true, sampling.offsets, taps);
+            out[i] = value_of(taps, 0);
+        }
+    } else {
+        footprint<W>(sampling, source, sampling.coordinates, true, sampling.offset, taps);
+        // 1D images have two texels: both rows are the same.
+        const int rows = taps.count > 2 ? 3 : 1;
+        for (int i = 0; i < 4; ++i) out[i] = value_of(taps, order[i] & rows);
+        if (sampling.is_cube && taps.has_corner && !call.has(image_integer)) {
+            Floats<W> sum = splat<W>(0.0f), count = splat<W>(0.0f);
+            for (int i = 0; i < 4; ++i) {
+                const Ints<W> exists = ~taps.is_corner[order[i]];
+                sum = exists ? sum + out[i] : sum;
+                count = exists ? count + 1.0f : count;
+            }
+            const Floats<W> mean = sum / maximum<W>(count, splat<W>(1.0f));
+            for (int i = 0; i < 4; ++i) out[i] = taps.is_corner[order[i]] ? mean : out[i];
+        }
+    }
+    write_result<W>(call, out, mask_of_bits<W>(call.live));
+}
+
+template <int W>
+[[gnu::noinline]] void query_level_of_detail(const Invocation& call) {
+    // The kind of channels does not matter here.
+    if (call.sampler == nullptr || call.image->mip_count == 0) return write_zeros<W>(call);
+    Sampling<W> sampling;
+    prepare<W>(call, sampling);
+    LevelOfDetail<W> detail;
+    level_of_detail<W>(call, sampling.coordinates, sampling.is_cube ? &sampling.cube : nullptr, sampling.spatial, detail);
+    Ints<W> level;
+    Floats<W> weight;
+    select_levels<W>(detail.lambda, call.image->mip_count, call.sampler->desc.mip == rhi::Filter::linear, level, weight);
+    const Floats<W> out[4] = {to_floats<W>(level) + weight, detail.unclamped, splat<W>(0.0f), splat<W>(0.0f)};
+    write_result<W>(call, out, mask_of_bits<W>(call.live));
+}
+
+}  // namespace
+}  // namespace nacre::cpu::NACRE_KERNEL_NAMESPACE

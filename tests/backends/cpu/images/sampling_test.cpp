@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// Filtered reads against the equations of the Vulkan specification in double precision.
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+
+#include "tests/backends/cpu/images/reference_sampler.h"
+
+namespace nacre::cpu::test {
+namespace {
+
+using rhi::Format;
+using rhi::ViewDimension;
+
+struct Shape {
+    const char* name;
+    ViewDimension dimension;
+    std::uint32_t width, height, depth, layers;
+};
+constexpr Shape shapes[] = {
+    {"d1", ViewDimension::d1, 37, 1, 1, 1},         {"d1_array", ViewDimension::d1_array, 33, 1, 1, 5},
+    {"d2", ViewDimension::d2, 64, 48, 1, 1},        {"d2_odd", ViewDimension::d2, 37, 23, 1, 1},
+    {"d2_array", ViewDimension::d2_array, 20, 31, 1, 4}, {"d3", ViewDimension::d3, 13, 9, 7, 1},
+    {"cube", ViewDimension::cube, 16, 16, 1, 6},    {"cube_array", ViewDimension::cube_array, 9, 9, 1, 12},
+    {"single_texel", ViewDimension::d2, 1, 1, 1, 1}, {"single_texel_cube", ViewDimension::cube, 1, 1, 1, 6},
+};
+
+bool is_cube(ViewDimension dimension) { return dimension == ViewDimension::cube || dimension == ViewDimension::cube_array; }
+bool has_layers(const Shape& shape) {
+    using enum ViewDimension;
+    return shape.dimension == d1_array || shape.dimension == d2_array || shape.dimension == cube_array;
+}
+
+class Sampling : public testing::TestWithParam<Shape> {
+  protected:
+    // Quads whose corners lie up to a few texels apart, anywhere in and around the image.
+    std::vector<Point> random_quads(std::size_t count) {
+        const Shape& shape = GetParam();
+        const int axes = static_cast<int>(coordinate_count(shape.dimension)) - (has_layers(shape) ? 1 : 0);
+        std::vector<Point> points(4 * count);
+        for (std::size_t quad = 0; quad < count; ++quad) {
+            const float spread = std::exp2(random_float(random, -9.0f, -1.0f));
+            float base[3], dx[3], dy[3];
+            for (int axis = 0; axis < 3; ++axis) {
+                base[axis] = is_cube(shape.dimension) ? random_float(random, -1, 1) : random_float(random, -1.6f, 2.7f);
+                dx[axis] = spread * random_float(random, -1, 1), dy[axis] = spread * random_float(random, -1, 1);
+            }
+            const float layer = random_float(random, -1.0f, static_cast<float>(shape.layers / (is_cube(shape.dimension) ? 6 : 1)));
+            for (std::uint32_t i = 0; i < 4; ++i) {
+                Point& point = points[4 * quad + i];
+                for (int axis = 0; axis < axes; ++axis) {
+                    const float value = base[axis] + ((i & 1) != 0 ? dx[axis] : 0.0f) + ((i & 2) != 0 ? dy[axis] : 0.0f);
+                    point.coordinates[axis] = std::bit_cast<std::uint32_t>(value);
+                    point.gradient_x[axis] = dx[axis] * random_float(random, 0.5f, 2.0f);
+                    point.gradient_y[axis] = dy[axis] * random_float(random, 0.5f, 2.0f);
+                    point.offset[axis] = static_cast<std::int32_t>(random_below(random, 16)) - 8;
+                }
+                if (axes < 4) point.coordinates[axes] = std::bit_cast<std::uint32_t>(layer);
+                point.lod = random_float(random, -1.0f, 4.0f);
+                point.reference = random_float(random, -0.1f, 1.1f);
+                point.min_lod = random_float(random, 0.0f, 3.0f);
+            }
+        }
+        return points;
+    }
+
+    rhi::SamplerDesc random_sampler() {
+        rhi::SamplerDesc desc;
+        const auto filter = [&] { return static_cast<rhi::Filter>(random_below(random, 2)); };
+        const auto mode = [&] { return static_cast<rhi::AddressMode>(random_below(random, 4)); };
+        desc.magnify = filter(), desc.minify = filter(), desc.mip = filter();
+        desc.address_u = mode(), desc.address_v = mode(), desc.address_w = mode();
+        desc.border = static_cast<rhi::BorderColor>(random_below(random, 3));
+        desc.compare = static_cast<rhi::CompareOperation>(random_below(random, 8));
+        if (random_below(random, 3) == 0) desc.mip_bias = random_float(random, -1.0f, 1.0f);
+        if (random_below(random, 3) == 0) desc.min_lod = random_float(random, 0.0f, 1.5f);
+        if (random_below(random, 3) == 0) desc.max_lod = random_float(random, 1.5f, 3.0f);
+        return desc;
+    }
+
+    // All points against the reference. Allowed: `tolerance` times the largest texel, plus 3e-5 levels of detail, which is what
+    // rounding the coordinates of a quad leaves of the differences between them.
+    void check(Format format, const rhi::SamplerDesc& desc, std::uint32_t flags, double tolerance, bool is_query = false) {
+        const Shape& shape = GetParam();
+        const std::uint32_t mips = std::min(4u, rhi::full_mip_count(shape.width, shape.height, shape.depth));
+        const TestImage image({format, shape.dimension, shape.width, shape.height, shape.depth, shape.layers, mips}, random);
+        const SamplerState sampler{desc};
+        const std::vector<Point> points = random_quads(100);
+        const bool is_integer = rhi::info(format).is_integer();
+        if (is_integer) flags |= image_integer;
+        const auto results = run_points(image_function(16), 16, &image.view, &sampler, {.flags = flags}, points);
+        ReferenceSampler reference(image, desc);
+        std::size_t ambiguous = 0;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            const auto quad = std::span(points).subspan(i & ~std::size_t{3}).first<4>();
+            const ReferenceResult expected = is_query ? reference.query(flags, quad, i & 3) : reference.sample(flags, quad, i & 3);
+            if (expected.is_ambiguous) {
+                ++ambiguous;
+                continue;
+            }
+            for (int c = 0; c < 4; ++c) {
+                if (is_integer) {
+                    const auto bits = static_cast<std::uint32_t>(static_cast<std::int64_t>(expected.value[c]));
+                    ASSERT_EQ(results[i][c], bits) << "point " << i << " channel " << c;
+                } else {
+                    ASSERT_NEAR(std::bit_cast<float>(results[i][c]), expected.value[c], tolerance) << "point " << i << " channel " << c;
+                }
+            }
+        }
+        // Most points must count.
+        ASSERT_LT(ambiguous, points.size() / 4);
+    }
+
+    Random random{11};
+};
+
+// Every lane of one call must have its own level: shapes that fit into one mip have none.
+constexpr std::uint32_t every_lod[] = {image_lod_explicit, image_lod_implicit, image_lod_gradient, image_lod_implicit | image_min_lod};
+
+TEST_P(Sampling, FiltersEveryKindOfFormat) {
+    for (const Format format : {Format::rgba8_unorm, Format::rgba8_srgb, Format::bgra8_srgb, Format::rgba8_snorm, Format::r8_unorm, Format::rg8_unorm,
+                                Format::r16_unorm, Format::rgba16_float, Format::rg16_float, Format::r32_float, Format::rgba32_float,
+                                Format::rgb10a2_unorm, Format::rg11b10_float, Format::rgb9e5_float, Format::bc1_rgba_srgb,
+                                Format::bc3_rgba_unorm, Format::bc5_rg_snorm, Format::bc7_rgba_unorm, Format::d24_unorm_s8_uint}) {
+        SCOPED_TRACE(rhi::info(format).name);
+        for (const std::uint32_t lod : every_lod) {
+            if (HasFatalFailure()) return;
+            check(format, random_sampler(), flags_of(ImageOperation::sample) | lod, 2e-4);
+        }
+    }
+}
+
+TEST_P(Sampling, FiltersWithEverySampler) {
+    for (int i = 0; i < 100 && !HasFatalFailure(); ++i) {
+        const rhi::SamplerDesc desc = random_sampler();
+        SCOPED_TRACE(testing::Message() << "sampler " << i);
+        check(Format::rgba8_unorm, desc, flags_of(ImageOperation::sample) | every_lod[i % 4], 1e-4);
+        check(Format::rgba32_uint, desc, flags_of(ImageOperation::sample) | every_lod[i % 4], 0.0);
+    }
+}
+
+TEST_P(Sampling, ComparesDepths) {
+    for (int i = 0; i < 50 && !HasFatalFailure(); ++i) {
+        rhi::SamplerDesc desc = random_sampler();
+        desc.comparison = true;
+        check(i % 2 == 0 ? Format::d32_float : Format::d16_unorm, desc,
+              flags_of(ImageOperation::sample) | image_compare | every_lod[i % 4], 1e-4);
+    }
+}
+
+TEST_P(Sampling, AppliesOffsets) {
+    if (is_cube(GetParam().dimension)) return;  // Offsets do not exist for cubes.
+    for (int i = 0; i < 30 && !HasFatalFailure(); ++i) {
+        check(Format::rgba16_float, random_sampler(), flags_of(ImageOperation::sample) | image_offset | every_lod[i % 4], 2e-4);
+    }
+}
+
+TEST_P(Sampling, FiltersAnisotropically) {
+    for (int i = 0; i < 30 && !HasFatalFailure(); ++i) {
+        rhi::SamplerDesc desc = random_sampler();
+        desc.max_anisotropy = random_float(random, 1.5f, 16.0f);
+        desc.magnify = desc.minify = rhi::Filter::linear;
+        check(Format::rgba8_unorm, desc, flags_of(ImageOperation::sample) | (i % 2 == 0 ? image_lod_implicit : image_lod_gradient), 1e-4);
+    }
+}
+
+TEST_P(Sampling, TellsTheLevelOfDetail) {
+    for (int i = 0; i < 20 && !HasFatalFailure(); ++i) {
+        rhi::SamplerDesc desc = random_sampler();
+        check(Format::rgba8_unorm, desc, flags_of(ImageOperation::query_lod) | image_lod_implicit, 1e-4, true);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Shapes, Sampling, testing::ValuesIn(shapes), [](const auto& each) { return std::string(each.param.name); });
+
+}  // namespace
+}  // namespace nacre::cpu::test
