@@ -15,7 +15,7 @@
 namespace nacre::cpu {
 namespace {
 
-constexpr std::uint32_t piece_texels = 128;
+constexpr std::uint32_t piece_texels = 64;
 /// Texels of the mip above that a piece is made of: at most 3 for each, where 3 texels become 1; 2 and a fraction else.
 constexpr std::uint32_t source_piece_texels = piece_texels * 2 + 8;
 
@@ -126,15 +126,22 @@ void Transfer::resolve(const ImageView& source, const ImageView& destination, st
             }
             for (std::uint32_t x = 0; x < width; x += piece_texels) {
                 const std::uint32_t piece = std::min(piece_texels, width - x);
+                // Inside of surfaces all samples are the same.
+                const std::size_t bytes = std::size_t{piece} * source.texel_bytes, at = std::size_t{x} * source.texel_bytes;
+                std::uint32_t same = 1;
+                while (same < source.samples && std::memcmp(texels + at, texels + same * from.sample_stride + at, bytes) == 0)
+                    ++same;
+                if (same == source.samples && source.format == destination.format) {
+                    std::memcpy(out + at, texels + at, bytes);
+                    continue;
+                }
                 const std::span totals(sum.data(), piece);
                 std::ranges::fill(totals, LinearTexel{});
                 for (std::uint32_t sample = 0; sample < source.samples; ++sample) {
-                    decode_row(source.format,
-                               texels + sample * from.sample_stride + std::size_t{x} * source.texel_bytes, piece,
-                               decoded.data());
+                    decode_row(source.format, texels + sample * from.sample_stride + at, piece, decoded.data());
                     add_weighted(totals, decoded, weight);
                 }
-                encode_row(destination.format, totals.data(), piece, out + std::size_t{x} * destination.texel_bytes);
+                encode_row(destination.format, totals.data(), piece, out + at);
             }
         }
     });
