@@ -165,6 +165,21 @@ TEST(Resolves, AverageTheSamplesOfEveryFormat) {
     EXPECT_GE(formats, 24);
 }
 
+TEST(Resolves, SeeWhereOneSampleOfOneTexelDiffers) {
+    const auto scheduler = Scheduler::create(2);
+    Transfer transfer(*scheduler);
+    for (std::uint32_t sample = 0; sample < 4; ++sample) {
+        const auto source = make({.format = Format::r8_unorm, .width = 301, .height = 3, .samples = 4});
+        const auto destination = make({.format = Format::r8_unorm, .width = 301, .height = 3});
+        const ImageLevel& level = source->whole().levels[0];
+        std::memset(level.data, 40, level.layer_stride);
+        level.data[sample * level.sample_stride + 301 + 170] = std::byte{80};
+        transfer.resolve(source->whole(), destination->whole(), 301, 3);
+        for (std::uint32_t i = 0; i < 903; ++i)
+            ASSERT_EQ(destination->whole().levels[0].data[i], i == 301 + 170 ? std::byte{50} : std::byte{40}) << sample << ", " << i;
+    }
+}
+
 TEST(Resolves, TakeTheFirstSampleOfIntegers) {
     const auto scheduler = Scheduler::create(2);
     Transfer transfer(*scheduler);

@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Render passes over a rasterizer of the test's own: targets, load and store operations, resolves, and the state of draws.
+#include <stdlib.h>
+
+#include <atomic>
+#include <thread>
+
 #include "tests/backends/cpu/cpu_device.h"
 #include "tests/backends/cpu/fake_rasterizer.h"
 
@@ -193,6 +198,29 @@ TEST_F(RenderPasses, ReadIndirectDraws) {
     EXPECT_TRUE(FakeRaster::draws[2].call.indexed);
     EXPECT_EQ(FakeRaster::draws[2].call.count, 6u);
     EXPECT_EQ(FakeRaster::draws[2].call.vertex_offset, -2);
+}
+
+TEST_F(RenderPasses, WhoseDrawsDoNotEndLoseTheDevice) {
+    ::setenv("NACRE_CPU_WATCHDOG_SECONDS", "0.1", 1);
+    device = make_device();
+    ::unsetenv("NACRE_CPU_WATCHDOG_SECONDS");
+    const rhi::Texture samples = target(Format::r8_unorm, 4, 4, 4), picture = target(Format::r8_unorm, 4, 4);
+    const auto drawn = pipeline(Format::r8_unorm, 4);
+    FakeRaster::paint = [](const RenderTargets&, const FakeDraw& draw) {
+        while (std::atomic_ref(draw.state.context.state->expired).load() == 0) std::this_thread::yield();
+    };
+    rhi::CommandList list = device->create_command_list();
+    list.begin_render_pass({.color = {{.view = samples, .resolve = picture}}});
+    list.set_pipeline(drawn);
+    list.set_push_constants(std::uint32_t{1});
+    list.set_vertex_buffer(0, make_buffer(*device, 64));
+    list.draw({.vertex_count = 3});
+    list.end_render_pass();
+    const auto waited = device->wait(ok(device->submit(std::move(list))));
+    ASSERT_FALSE(waited);
+    EXPECT_EQ(waited.error().code, ErrorCode::device_lost);
+    EXPECT_THAT(waited.error().message(), testing::HasSubstr("draw.frag"));
+    device.reset();
 }
 
 TEST_F(RenderPasses, CountSamplesBetweenBeginAndEnd) {
