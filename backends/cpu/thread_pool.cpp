@@ -2,6 +2,7 @@
 #include "backends/cpu/thread_pool.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "backends/cpu/task_loop.h"
 
@@ -37,9 +38,20 @@ void ThreadPool::run(std::uint32_t count, const std::function<void(std::uint32_t
         ++round_;
     }
     started_.notify_all();
-    run_tasks(next_, count, 0, task);
+    work(count, 0, task);
     std::unique_lock lock(mutex_);
     finished_.wait(lock, [&] { return working_ == 0; });
+    if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
+}
+
+void ThreadPool::work(std::uint32_t count, std::uint32_t thread,
+                      const std::function<void(std::uint32_t, std::uint32_t)>& task) {
+    try {
+        run_tasks(next_, count, thread, task);
+    } catch (...) {
+        const std::scoped_lock lock(mutex_);
+        if (!thrown_) thrown_ = std::current_exception();
+    }
 }
 
 void ThreadPool::loop(std::uint32_t thread) {
@@ -52,7 +64,7 @@ void ThreadPool::loop(std::uint32_t thread) {
         const auto* task = task_;
         const std::uint32_t count = count_;
         lock.unlock();
-        run_tasks(next_, count, thread, *task);
+        work(count, thread, *task);
         lock.lock();
         if (--working_ == 0) finished_.notify_one();
     }

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -23,6 +24,8 @@ class ThreadPool : public Scheduler {
 
   private:
     void loop(std::uint32_t thread);
+    /// Works on the tasks of the round; keeps the first exception.
+    void work(std::uint32_t count, std::uint32_t thread, const std::function<void(std::uint32_t, std::uint32_t)>& task);
 
     const std::uint32_t thread_count_;
     std::mutex mutex_;
@@ -32,6 +35,7 @@ class ThreadPool : public Scheduler {
     bool ending_ = false;
     const std::function<void(std::uint32_t, std::uint32_t)>* task_ = nullptr;
     std::uint32_t count_ = 0;
+    std::exception_ptr thrown_;    ///< By a task of the round.
     std::atomic<std::uint32_t> next_{0};
     std::vector<std::thread> threads_;  ///< All but the caller's.
 };

@@ -170,6 +170,19 @@ TEST(Dispatches, OfAbsurdIndirectCountsAreStoppedToo) {
     EXPECT_THAT(waited.error().message(), testing::HasSubstr("short.comp"));
 }
 
+TEST(Dispatches, ThatRunOutOfMemoryLoseTheDevice) {
+    const auto device = make_device();
+    const auto pipeline = make_compute(*device, "greedy.comp", [](const ShaderContext*, const WorkgroupRange*) {},
+                                       std::uint64_t{1} << 60);
+    rhi::CommandList list = device->create_command_list();
+    prepare(*device, list, pipeline, make_buffer(*device, 64));
+    list.dispatch({1, 1, 1});
+    const auto waited = device->wait(ok(device->submit(std::move(list))));
+    ASSERT_FALSE(waited);
+    EXPECT_EQ(waited.error().code, ErrorCode::device_lost);
+    EXPECT_THAT(waited.error().message(), testing::HasSubstr("out of memory"));
+}
+
 std::atomic<bool> gate_is_open{false};
 
 void wait_at_the_gate(const ShaderContext* context, const WorkgroupRange* range) {

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cfenv>
 #include <chrono>
+#include <new>
 #include <thread>
 #include <vector>
 
@@ -84,6 +85,25 @@ TEST_P(Schedulers, ComputeWithTheUsualRounding) {
     std::fesetround(FE_TONEAREST);
     EXPECT_EQ(wrong, 0);
     EXPECT_EQ(after, FE_UPWARD) << "the caller's rounding was changed";
+}
+
+TEST_P(Schedulers, PassOnWhatATaskThrows) {
+    for (const std::uint32_t threads : {1u, 3u}) {
+        const auto scheduler = GetParam().make(threads);
+        std::atomic<int> running{0};
+        EXPECT_THROW(scheduler->run(100,
+                                    [&](std::uint32_t index, std::uint32_t) {
+                                        if (index % 7 == 3) throw std::bad_alloc();
+                                        ++running;
+                                        std::this_thread::sleep_for(std::chrono::microseconds(100));
+                                        --running;
+                                    }),
+                     std::bad_alloc);
+        EXPECT_EQ(running, 0) << "a task ran on";
+        std::atomic<int> calls{0};
+        scheduler->run(100, [&](std::uint32_t, std::uint32_t) { ++calls; });
+        EXPECT_EQ(calls, 100);
+    }
 }
 
 TEST(Queues, RunInOrderAndDrain) {
