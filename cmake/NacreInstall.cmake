@@ -33,7 +33,7 @@ foreach(header IN LISTS public_headers)
   install(FILES "${CMAKE_SOURCE_DIR}/${header}" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/nacre/${folder}")
 endforeach()
 # Of a backend a program needs only the header that declares it.
-foreach(backend vulkan gl)
+foreach(backend vulkan gl cpu)
   if(EXISTS "${CMAKE_SOURCE_DIR}/backends/${backend}/${backend}_backend.h")
     install(FILES "${CMAKE_SOURCE_DIR}/backends/${backend}/${backend}_backend.h"
       DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/nacre/backends/${backend}")

@@ -9,6 +9,9 @@
 #ifdef NACRE_HAS_GL
 #include "backends/gl/gl_backend.h"
 #endif
+#ifdef NACRE_HAS_CPU
+#include "backends/cpu/cpu_backend.h"
+#endif
 
 namespace nacre {
 
@@ -23,6 +26,10 @@ std::vector<std::unique_ptr<rhi::Backend>> all_backends() {
 #ifdef NACRE_HAS_GL
     backends.push_back(gl::make_backend());
     backends.push_back(gl::make_es_backend());
+#endif
+#ifdef NACRE_HAS_CPU
+    // Works on every machine, so it comes first among the choices of "auto" once it can do all that the others can.
+    backends.push_back(cpu::make_backend());
 #endif
     return backends;
 }

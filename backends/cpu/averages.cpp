@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "backends/cpu/parallel_parts.h"
+#include "backends/cpu/texel_rows.h"
+#include "backends/cpu/transfer.h"
+
+/// @file
+/// Mips and resolves: averages of texels in linear light. Rows are worked on in pieces that lie on the stack.
+
+namespace nacre::cpu {
+namespace {
+
+constexpr std::uint32_t piece_texels = 64;
+/// Texels of the mip above that a piece is made of: at most 3 for each, where 3 texels become 1; 2 and a fraction else.
+constexpr std::uint32_t source_piece_texels = piece_texels * 2 + 8;
+
+/// The two texels that a texel of the next mip is made of, and the weight of the second.
+struct Taps {
+    std::uint32_t first, second;
+    float weight;
+};
+
+/// @param size  texels of the mip above
+/// @param next  texels of the mip that is made
+Taps taps_of(std::uint32_t index, std::uint32_t size, std::uint32_t next) {
+    const double place = std::max((index + 0.5) * size / next - 0.5, 0.0);
+    const auto first = static_cast<std::uint32_t>(place);
+    return {first, std::min(first + 1, size - 1), static_cast<float>(place - first)};
+}
+
+void add_weighted(std::span<LinearTexel> sum, std::span<const LinearTexel> texels, float weight) {
+    for (std::size_t x = 0; x < sum.size(); ++x)
+        for (std::size_t c = 0; c < 4; ++c) sum[x][c] += texels[x][c] * weight;
+}
+
+/// Makes one row of a mip of the up to four rows above it.
+class MipRow {
+  public:
+    MipRow(rhi::Format format, std::uint32_t texel_bytes, std::span<const Taps> columns)
+        : format_(format), texel_bytes_(texel_bytes), columns_(columns) {}
+
+    /// @param rows  first texel of each row, with its weight
+    void make(std::span<const std::pair<const std::byte*, float>> rows, std::byte* out) {
+        const auto width = static_cast<std::uint32_t>(columns_.size());
+        for (std::uint32_t begin = 0; begin < width; begin += piece_texels) {
+            const auto columns = columns_.subspan(begin, std::min(piece_texels, width - begin));
+            const std::uint32_t from = columns.front().first;
+            const std::uint32_t count = columns.back().second - from + 1;
+            const std::span sum(sum_.data(), count);
+            std::ranges::fill(sum, LinearTexel{});
+            for (const auto& [texels, weight] : rows) {
+                if (weight == 0.0f) continue;
+                decode_row(format_, texels + std::size_t{from} * texel_bytes_, count, decoded_.data());
+                add_weighted(sum, decoded_, weight);
+            }
+            for (std::size_t x = 0; x < columns.size(); ++x) {
+                const LinearTexel &a = sum[columns[x].first - from], &b = sum[columns[x].second - from];
+                const float weight = columns[x].weight;
+                for (std::size_t c = 0; c < 4; ++c) result_[x][c] = a[c] * (1.0f - weight) + b[c] * weight;
+            }
+            encode_row(format_, result_.data(), static_cast<std::uint32_t>(columns.size()),
+                       out + std::size_t{begin} * texel_bytes_);
+        }
+    }
+
+  private:
+    rhi::Format format_;
+    std::uint32_t texel_bytes_;
+    std::span<const Taps> columns_;
+    std::array<LinearTexel, source_piece_texels> sum_, decoded_;
+    std::array<LinearTexel, piece_texels> result_;
+};
+
+}  // namespace
+
+void Transfer::generate_mips(const ImageView& view) {
+    for (std::uint32_t mip = 1; mip < view.mip_count; ++mip) {
+        const ImageLevel &from = view.levels[mip - 1], &to = view.levels[mip];
+        std::vector<Taps> columns(to.width);
+        for (std::uint32_t x = 0; x < to.width; ++x) columns[x] = taps_of(x, from.width, to.width);
+        const std::uint64_t layer_rows = std::uint64_t{to.height} * to.depth;
+        const std::uint64_t row_cost = std::uint64_t{from.width} * sizeof(LinearTexel);
+        in_parallel(scheduler_, layer_rows * view.layer_count, row_cost, [&](std::uint64_t first, std::uint64_t count) {
+            MipRow row(view.format, view.texel_bytes, columns);
+            for (std::uint64_t at = first; at < first + count; ++at) {
+                const std::uint64_t layer = at / layer_rows;
+                const auto z = static_cast<std::uint32_t>(at % layer_rows / to.height);
+                const auto y = static_cast<std::uint32_t>(at % to.height);
+                const Taps rows = taps_of(y, from.height, to.height), slices = taps_of(z, from.depth, to.depth);
+                const auto source = [&](std::uint32_t slice, std::uint32_t line, float weight) {
+                    return std::pair<const std::byte*, float>(
+                        from.data + layer * from.layer_stride + slice * from.slice_stride +
+                            std::uint64_t{line} * from.row_stride,
+                        weight);
+                };
+                const std::array sources{
+                    source(slices.first, rows.first, (1.0f - slices.weight) * (1.0f - rows.weight)),
+                    source(slices.first, rows.second, (1.0f - slices.weight) * rows.weight),
+                    source(slices.second, rows.first, slices.weight * (1.0f - rows.weight)),
+                    source(slices.second, rows.second, slices.weight * rows.weight)};
+                row.make(sources,
+                         to.data + layer * to.layer_stride + z * to.slice_stride + std::uint64_t{y} * to.row_stride);
+            }
+        });
+    }
+}
+
+void Transfer::resolve(const ImageView& source, const ImageView& destination, std::uint32_t width, std::uint32_t height) {
+    const ImageLevel &from = source.levels[0], &to = destination.levels[0];
+    const bool is_copy = source.samples == 1 || rhi::info(source.format).is_integer();
+    const std::uint64_t row_cost = std::uint64_t{width} * (is_copy ? source.texel_bytes : sizeof(LinearTexel));
+    const float weight = 1.0f / static_cast<float>(source.samples);
+    in_parallel(scheduler_, height, row_cost, [&](std::uint64_t first, std::uint64_t count) {
+        std::array<LinearTexel, piece_texels> sum, decoded;
+        for (std::uint64_t y = first; y < first + count; ++y) {
+            const std::byte* texels = from.data + y * from.row_stride;
+            std::byte* out = to.data + y * to.row_stride;
+            if (is_copy) {
+                std::memcpy(out, texels, std::size_t{width} * source.texel_bytes);
+                continue;
+            }
+            for (std::uint32_t x = 0; x < width; x += piece_texels) {
+                const std::uint32_t piece = std::min(piece_texels, width - x);
+                // Inside of surfaces all samples are the same.
+                const std::size_t bytes = std::size_t{piece} * source.texel_bytes, at = std::size_t{x} * source.texel_bytes;
+                std::uint32_t same = 1;
+                while (same < source.samples && std::memcmp(texels + at, texels + same * from.sample_stride + at, bytes) == 0)
+                    ++same;
+                if (same == source.samples && source.format == destination.format) {
+                    std::memcpy(out + at, texels + at, bytes);
+                    continue;
+                }
+                const std::span totals(sum.data(), piece);
+                std::ranges::fill(totals, LinearTexel{});
+                for (std::uint32_t sample = 0; sample < source.samples; ++sample) {
+                    decode_row(source.format, texels + sample * from.sample_stride + at, piece, decoded.data());
+                    add_weighted(totals, decoded, weight);
+                }
+                encode_row(destination.format, totals.data(), piece, out + at);
+            }
+        }
+    });
+}
+
+}  // namespace nacre::cpu

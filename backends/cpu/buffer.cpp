@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backends/cpu/buffer.h"
+
+#include <fmt/format.h>
+
+namespace nacre::cpu {
+
+Expected<std::unique_ptr<rhi::BackendBuffer>> CpuBuffer::create(const std::shared_ptr<HostMemory>& memory,
+                                                                const rhi::BufferDesc& desc) {
+    auto buffer = std::make_unique<CpuBuffer>();
+    buffer->block_ = MemoryBlock(memory, desc.size);
+    if (!buffer->block_.data())
+        return fail(ErrorCode::out_of_memory, "create buffer", fmt::format("'{}'", desc.name),
+                    fmt::format("{} bytes could not be had: the device holds {} of the {} bytes of this machine", desc.size,
+                                memory->reserved_bytes(), memory->capacity()),
+                    "Free other resources or use a smaller buffer.");
+    buffer->desc = desc;
+    if (desc.memory != rhi::MemoryKind::device) buffer->mapped = buffer->block_.data();
+    buffer->memory_bytes = desc.size;
+    return buffer;
+}
+
+}  // namespace nacre::cpu

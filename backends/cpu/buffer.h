@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "backends/cpu/host_memory.h"
+#include "rhi/backend.h"
+
+namespace nacre::cpu {
+
+/// Memory of the host, whatever the kind of memory that was asked for.
+class CpuBuffer : public rhi::BackendBuffer {
+  public:
+    static Expected<std::unique_ptr<rhi::BackendBuffer>> create(const std::shared_ptr<HostMemory>& memory,
+                                                                const rhi::BufferDesc& desc);
+    [[nodiscard]] std::byte* data() const { return block_.data(); }
+    [[nodiscard]] std::uint64_t size() const { return block_.size(); }
+    /// Bytes from `offset` to the end; 0 for offsets behind it.
+    [[nodiscard]] std::uint64_t size_from(std::uint64_t offset) const { return offset < size() ? size() - offset : 0; }
+
+  private:
+    MemoryBlock block_;
+};
+
+}  // namespace nacre::cpu

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backends/cpu/device.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <new>
+#include <system_error>
+
+#include "backends/cpu/capabilities.h"
+#include "backends/cpu/sampler.h"
+#include "backends/cpu/shader.h"
+#include "backends/cpu/task_loop.h"
+#include "core/log.h"
+
+#ifndef NACRE_CPU_PLAIN_THREADS
+#include <tbb/version.h>
+#endif
+
+namespace nacre::cpu {
+namespace {
+
+std::string processor_name() {
+    std::ifstream file("/proc/cpuinfo");
+    for (std::string line; std::getline(file, line);) {
+        if (!line.starts_with("model name")) continue;
+        const std::size_t begin = line.find_first_not_of(" \t", line.find(':') + 1);
+        if (begin != std::string::npos) return line.substr(begin);
+    }
+    return "processor";
+}
+
+std::string driver_name() {
+    std::string text = "LLVM " NACRE_CPU_LLVM_VERSION;
+#ifndef NACRE_CPU_PLAIN_THREADS
+    text += fmt::format(", oneTBB {}.{}", TBB_VERSION_MAJOR, TBB_VERSION_MINOR);
+#endif
+    return text;
+}
+
+}  // namespace
+
+rhi::AdapterInfo describe_machine() {
+    static const rhi::AdapterInfo machine{.backend = "cpu",
+                                          .name = processor_name(),
+                                          .driver = driver_name(),
+                                          .api_version = "SPIR-V 1.6",
+                                          .is_software = true};
+    return machine;
+}
+
+CpuDevice::CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc& desc, std::unique_ptr<Compiler> compiler)
+    : adapter_(describe_machine()),
+      // Results must not depend on the lanes where arithmetic is consistent, so neither may the subgroup.
+      capabilities_(find_capabilities(options.mode == ExecutionMode::consistent ? max_lanes : options.lanes)),
+      faults_(desc.desc->faults),
+      memory_(std::make_shared<HostMemory>(machine_memory_bytes(), desc.desc->faults.fail_allocation)),
+      compiler_(std::move(compiler)),
+      scheduler_(Scheduler::create(options.threads)),
+      watchdog_(watchdog_limit()),
+      executor_(*scheduler_, watchdog_, options.lanes) {}
+
+Expected<std::unique_ptr<rhi::BackendDevice>> CpuDevice::create(const DeviceOptions& options,
+                                                                const rhi::BackendDeviceDesc& desc) try {
+    NACRE_TRY(auto compiler, Compiler::create({.lanes = options.lanes, .mode = options.mode}));
+    std::unique_ptr<CpuDevice> device(new CpuDevice(options, desc, std::move(compiler)));
+    if (log_is_on(LogLevel::debug))
+        log_message(LogLevel::debug,
+                    fmt::format("device '{}': {}, {} lanes, {} threads", desc.desc->name, device->adapter_.name,
+                                options.lanes, device->scheduler_->thread_count()));
+    return device;
+} catch (const std::bad_alloc&) {
+    return fail(ErrorCode::out_of_memory, "create device", fmt::format("'{}'", desc.desc->name), "there is no memory for it",
+                "Free other resources.");
+} catch (const std::system_error& error) {
+    return fail(ErrorCode::out_of_memory, "create device", fmt::format("'{}'", desc.desc->name),
+                fmt::format("the system starts no more threads: {}", error.what()), "Use fewer threads (threads=N).");
+}
+
+CpuDevice::~CpuDevice() = default;
+
+Expected<void> CpuDevice::check_lost(const char* attempted) const {
+    if (!lost_) return {};
+    const std::scoped_lock lock(mutex_);
+    return fail(ErrorCode::device_lost, attempted, adapter_.name, fmt::format("the device was lost: {}", lost_reason_),
+                "Destroy the device and make a new one.");
+}
+
+void CpuDevice::lose(const std::string& reason) {
+    const std::scoped_lock lock(mutex_);
+    if (lost_) return;
+    lost_reason_ = reason;
+    lost_ = true;
+    changed_.notify_all();
+}
+
+Expected<std::unique_ptr<rhi::BackendBuffer>> CpuDevice::create_buffer(const rhi::BufferDesc& desc) {
+    NACRE_CHECK(check_lost("create buffer"));
+    return CpuBuffer::create(memory_, desc);
+}
+Expected<std::unique_ptr<rhi::BackendTexture>> CpuDevice::create_texture(const rhi::TextureDesc& desc) {
+    NACRE_CHECK(check_lost("create texture"));
+    return CpuTexture::create(memory_, desc);
+}
+Expected<std::unique_ptr<rhi::BackendSampler>> CpuDevice::create_sampler(const rhi::SamplerDesc& desc) {
+    NACRE_CHECK(check_lost("create sampler"));
+    return std::make_unique<CpuSampler>(desc);
+}
+Expected<std::unique_ptr<rhi::BackendShader>> CpuDevice::create_shader(const rhi::ShaderDesc& desc,
+                                                                       const rhi::ShaderReflection& reflection) {
+    NACRE_CHECK(check_lost("create shader"));
+    return std::make_unique<CpuShader>(desc, reflection);
+}
+Expected<std::unique_ptr<rhi::BackendBindGroupLayout>> CpuDevice::create_bind_group_layout(
+    const rhi::BindGroupLayoutDesc& desc) {
+    NACRE_CHECK(check_lost("create bind group layout"));
+    return std::make_unique<CpuBindGroupLayout>(desc, capabilities_.max_bindless_textures);
+}
+Expected<std::unique_ptr<rhi::BackendBindGroup>> CpuDevice::create_bind_group(
+    rhi::BackendBindGroupLayout& layout, std::span<const rhi::BackendBinding> bindings, const std::string& name) {
+    NACRE_CHECK(check_lost("create bind group"));
+    return CpuBindGroup::create(layout, bindings, name);
+}
+Expected<std::unique_ptr<rhi::BackendGraphicsPipeline>> CpuDevice::create_graphics_pipeline(
+    const rhi::BackendGraphicsPipelineDesc& desc) {
+    NACRE_CHECK(check_lost("create graphics pipeline"));
+    return CpuGraphicsPipeline::create(*compiler_, desc);
+}
+Expected<std::unique_ptr<rhi::BackendComputePipeline>> CpuDevice::create_compute_pipeline(
+    const rhi::BackendComputePipelineDesc& desc) {
+    NACRE_CHECK(check_lost("create compute pipeline"));
+    return CpuComputePipeline::create(*compiler_, desc);
+}
+Expected<std::unique_ptr<rhi::BackendQueryPool>> CpuDevice::create_query_pool(const rhi::QueryPoolDesc& desc) {
+    NACRE_CHECK(check_lost("create query pool"));
+    return std::make_unique<CpuQueryPool>(desc);
+}
+
+// Host and device share all memory.
+Expected<void> CpuDevice::flush_mapped(rhi::BackendBuffer&) { return check_lost("unmap buffer"); }
+Expected<void> CpuDevice::invalidate_mapped(rhi::BackendBuffer&) { return check_lost("map buffer"); }
+
+Expected<void> CpuDevice::execute(const rhi::ExecutionPlan& plan) try {
+    NACRE_CHECK(check_lost("submit"));
+    if (++submissions_ == faults_.lose_device) {
+        queue_.drain();
+        lose("planted by FaultInjection::lose_device");
+    }
+    NACRE_CHECK(check_lost("submit"));
+    queue_.post([this, flat = flatten(plan)] { run_plan(flat); });
+    return {};
+} catch (const std::bad_alloc&) {
+    return fail(ErrorCode::out_of_memory, "submit", adapter_.name, "there is no memory for the commands",
+                "Submit fewer commands at one time.");
+}
+
+void CpuDevice::run_plan(const FlatPlan& plan) {
+    if (lost_) return;
+    std::string reason;
+    try {
+        const DefaultArithmetic arithmetic;
+        reason = executor_.execute(plan);
+    } catch (const std::bad_alloc&) {
+        reason = fmt::format("out of memory while executing submission {}", plan.serial);
+    }
+    if (!reason.empty()) {
+        lose(reason);
+        return;
+    }
+    const std::scoped_lock lock(mutex_);
+    completed_ = plan.serial;
+    changed_.notify_all();
+}
+
+std::uint64_t CpuDevice::completed_serial() { return completed_; }
+
+Expected<void> CpuDevice::wait(std::uint64_t serial, std::chrono::nanoseconds timeout) {
+    std::unique_lock lock(mutex_);
+    const auto finished = [&] { return completed_ >= serial || lost_; };
+    // A time point at the end of time would overflow inside wait_for.
+    if (timeout > std::chrono::hours(24 * 365))
+        changed_.wait(lock, finished);
+    else if (!changed_.wait_for(lock, timeout, finished))
+        return fail(ErrorCode::timeout, "wait for submission", std::to_string(serial),
+                    fmt::format("it was not complete after {} ms",
+                                std::chrono::duration_cast<std::chrono::milliseconds>(timeout).count()),
+                    "Wait longer; the work goes on.");
+    if (completed_ >= serial) return {};
+    lock.unlock();
+    return check_lost("wait for submission");
+}
+
+Expected<std::vector<std::uint64_t>> CpuDevice::read_queries(rhi::BackendQueryPool& pool, std::uint32_t first,
+                                                             std::uint32_t count) {
+    NACRE_CHECK(check_lost("read queries"));
+    const auto begin = static_cast<CpuQueryPool&>(pool).values.begin() + first;
+    return std::vector<std::uint64_t>(begin, begin + count);
+}
+
+rhi::MemoryStatistics CpuDevice::memory_statistics() const {
+    rhi::MemoryStatistics statistics;
+    statistics.reserved_bytes = memory_->reserved_bytes();
+    statistics.driver_allocations = memory_->allocations();
+    return statistics;
+}
+
+Expected<void> CpuDevice::save_pipeline_cache() { return {}; }  // The compiler keeps what it compiles as it does so.
+
+}  // namespace nacre::cpu

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backends/cpu/texture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace nacre::cpu {
+namespace {
+
+/// Lays out one plane from byte `start` on and returns where it ends. `data` holds offsets until there is memory.
+std::uint64_t lay_out(std::array<ImageLevel, max_mips>& levels, std::array<std::uint64_t, max_mips>& offsets,
+                      const rhi::TextureDesc& desc, std::uint32_t texel_bytes, std::uint32_t block_width,
+                      std::uint64_t start) {
+    std::uint64_t at = start;
+    for (std::uint32_t mip = 0; mip < desc.mips; ++mip) {
+        const rhi::Extent3D extent = rhi::mip_extent(desc, mip);
+        ImageLevel& level = levels[mip];
+        level.width = extent.width, level.height = extent.height, level.depth = extent.depth;
+        level.row_stride = (extent.width + block_width - 1) / block_width * texel_bytes;
+        level.slice_stride = std::uint64_t{level.row_stride} * ((extent.height + block_width - 1) / block_width);
+        level.sample_stride = level.slice_stride * extent.depth;
+        // Whole cache lines, so that threads that write different layers never share one.
+        level.layer_stride = (level.sample_stride * desc.samples + 63) / 64 * 64;
+        offsets[mip] = at;
+        at += level.layer_stride * desc.layers;
+    }
+    return at;
+}
+
+rhi::ViewDimension whole_dimension(const rhi::TextureDesc& desc) {
+    switch (desc.dimension) {
+        case rhi::TextureDimension::d1: return rhi::ViewDimension::d1_array;
+        case rhi::TextureDimension::d2: return rhi::ViewDimension::d2_array;
+        case rhi::TextureDimension::d3: return rhi::ViewDimension::d3;
+        case rhi::TextureDimension::cube: return rhi::ViewDimension::cube_array;
+    }
+    return rhi::ViewDimension::d2_array;
+}
+
+}  // namespace
+
+std::uint32_t stored_texel_bytes(rhi::Format format) { return rhi::info(format).block_bytes; }
+
+Expected<std::unique_ptr<rhi::BackendTexture>> CpuTexture::create(const std::shared_ptr<HostMemory>& memory,
+                                                                  const rhi::TextureDesc& desc) {
+    const rhi::FormatInfo& facts = rhi::info(desc.format);
+    if (desc.mips > max_mips)
+        return fail(ErrorCode::unsupported, "create texture", fmt::format("'{}'", desc.name),
+                    fmt::format("expected at most {} mips, found {}", max_mips, desc.mips), "Use a smaller texture.");
+    auto texture = std::make_unique<CpuTexture>();
+    texture->desc = desc;
+    ImageView& whole = texture->whole_;
+    whole.format = desc.format;
+    whole.dimension = whole_dimension(desc);
+    whole.mip_count = desc.mips;
+    whole.layer_count = desc.layers;
+    whole.samples = desc.samples;
+    whole.texel_bytes = stored_texel_bytes(desc.format);
+    std::array<std::uint64_t, max_mips> offsets{}, stencil_offsets{};
+    std::uint64_t bytes = lay_out(whole.levels, offsets, desc, whole.texel_bytes, facts.block_width, 0);
+    if (facts.has_stencil) bytes = lay_out(whole.stencil_levels, stencil_offsets, desc, 1, 1, bytes);
+    texture->block_ = MemoryBlock(memory, bytes);
+    std::byte* const data = texture->block_.data();
+    if (!data)
+        return fail(ErrorCode::out_of_memory, "create texture", fmt::format("'{}'", desc.name),
+                    fmt::format("{} bytes for {}x{}x{} texels, {} layers, {} mips, {} samples of {} could not be had: the "
+                                "device holds {} of the {} bytes of this machine",
+                                bytes, desc.width, desc.height, desc.depth, desc.layers, desc.mips, desc.samples, facts.name,
+                                memory->reserved_bytes(), memory->capacity()),
+                    "Free other resources or use a smaller texture.");
+    for (std::uint32_t mip = 0; mip < desc.mips; ++mip) {
+        whole.levels[mip].data = data + offsets[mip];
+        if (facts.has_stencil) whole.stencil_levels[mip].data = data + stencil_offsets[mip];
+    }
+    texture->memory_bytes = bytes;
+    return texture;
+}
+
+ImageView CpuTexture::make_view(const rhi::ViewReference& reference) const {
+    ImageView view;
+    view.format = reference.format;
+    view.dimension = reference.dimension;
+    view.samples = whole_.samples;
+    view.texel_bytes = whole_.texel_bytes;
+    view.mip_count = std::min(reference.mip_count, whole_.mip_count - std::min(reference.base_mip, whole_.mip_count));
+    view.layer_count = reference.dimension == rhi::ViewDimension::d3 ? 1 : reference.layer_count;
+    for (std::uint32_t mip = 0; mip < view.mip_count; ++mip) {
+        const auto part = [&](const ImageLevel& from) {
+            ImageLevel level = from;
+            if (level.data) level.data += level.layer_stride * reference.base_layer;
+            return level;
+        };
+        view.levels[mip] = part(whole_.levels[reference.base_mip + mip]);
+        view.stencil_levels[mip] = part(whole_.stencil_levels[reference.base_mip + mip]);
+    }
+    return view;
+}
+
+const ImageView* CpuTexture::view(const rhi::ViewReference& reference) {
+    const ViewKey key{reference.dimension, reference.format,     reference.base_mip,
+                      reference.mip_count, reference.base_layer, reference.layer_count};
+    std::unique_ptr<ImageView>& kept = views_[key];
+    if (!kept) kept = std::make_unique<ImageView>(make_view(reference));
+    return kept.get();
+}
+
+}  // namespace nacre::cpu
