@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -61,10 +62,23 @@ struct DrawCall {
     std::int32_t vertex_offset = 0;
 };
 
+/// gl_PointSize is kept between 1 and this.
+inline constexpr float largest_point_size = 255.0f;
+
+/// For tests; the results are the same whatever is chosen.
+struct RasterizerOptions {
+    std::uint32_t instruction_set = 2;  ///< At most: 0 the baseline of the processor family, 1 AVX2, 2 AVX-512.
+    bool hierarchical_depth = true;
+};
+
 /// Carries out the draws of render passes, one after another, on the threads of a scheduler. Not thread-safe.
+///
+/// Draws are collected and run together, in their order. DrawState and DrawCall are copied with the push constants; what they
+/// point to beyond that (pipelines, descriptors, buffers, the execution state) stays as it is until `end_pass` or
+/// `passed_samples` returns.
 class Rasterizer {
   public:
-    Rasterizer(Scheduler& scheduler, std::uint32_t lanes);
+    Rasterizer(Scheduler& scheduler, std::uint32_t lanes, const RasterizerOptions& options = {});
     ~Rasterizer();
 
     void begin_pass(const RenderTargets& targets);

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "backends/cpu/raster/planes.h"
+#include "backends/cpu/raster/simd.h"
+#include "backends/cpu/raster/tile_data.h"
+
+/// @file
+/// PrimitiveData of a record: done in the tiles, and only for primitives of which something is visible. Internal linkage, as in
+/// simd.h.
+
+namespace nacre::cpu::raster {
+namespace {
+
+NACRE_LANES_INLINE Float4 select4(Int4 mask, Float4 a, Float4 b) { return (Float4)(((Int4)a & mask) | ((Int4)b & ~mask)); }
+
+NACRE_LANES_INLINE void store_planes(Plane* planes, Float4 c, Float4 dx, Float4 dy, Int4 flat, Float4 provoking) {
+    c = select4(flat, provoking, c);
+    dx = (Float4)((Int4)dx & ~flat);
+    dy = (Float4)((Int4)dy & ~flat);
+    Float4 rest{};
+    transpose(c, dx, dy, rest);
+    store4(&planes[0].c, c), store4(&planes[1].c, dx), store4(&planes[2].c, dy), store4(&planes[3].c, rest);
+}
+
+inline void homogeneous_planes(const DrawPlan& draw, const Record& record, const ScreenVertex* const (&vertices)[3],
+                               PrimitiveData& primitive) {
+    const ScreenPoint points[3] = {screen_point(vertices[0]->clip, draw.scale, draw.translation),
+                                   screen_point(vertices[1]->clip, draw.scale, draw.translation),
+                                   screen_point(vertices[2]->clip, draw.scale, draw.translation)};
+    const HomogeneousWeights weights = homogeneous_weights(points);
+    double base[3];
+    for (int i = 0; i < 3; ++i) base[i] = weights.at(i, record.x0, record.y0);
+    primitive.inverse_w = {static_cast<float>(base[0] + base[1] + base[2]),
+                           static_cast<float>(weights.x[0] + weights.x[1] + weights.x[2]),
+                           static_cast<float>(weights.y[0] + weights.y[1] + weights.y[2]), 0.0f};
+    Plane* const planes = primitive.varyings();
+    const bool in_front = points[0].w > 0.0 && points[1].w > 0.0 && points[2].w > 0.0;
+    for (std::uint32_t input = 0; input < draw.input_count; ++input) {
+        if (draw.flat_masks[input] != 0) {
+            planes[input] = {vertices[0]->inputs()[input], 0.0f, 0.0f, 0.0f};
+            continue;
+        }
+        double values[3];
+        for (int i = 0; i < 3; ++i) values[i] = vertices[i]->inputs()[input];
+        if (draw.linear_masks[input] != 0 && in_front)
+            for (int i = 0; i < 3; ++i) values[i] *= points[i].w;
+        double c = 0.0, dx = 0.0, dy = 0.0;
+        for (int i = 0; i < 3; ++i)
+            c += values[i] * base[i], dx += values[i] * weights.x[i], dy += values[i] * weights.y[i];
+        if (draw.linear_masks[input] != 0 && !in_front) {
+            // What is linear on the screen has no meaning behind the eye: it is made linear between the corners of what is left
+            // after clipping.
+            double corners[3], x[3], y[3];
+            for (int j = 0; j < 3; ++j) {
+                x[j] = record.x[j] * (1.0 / subpixels), y[j] = record.y[j] * (1.0 / subpixels);
+                double numerator = 0.0, denominator = 0.0;
+                for (int i = 0; i < 3; ++i)
+                    numerator += values[i] * weights.at(i, x[j], y[j]), denominator += weights.at(i, x[j], y[j]);
+                corners[j] = denominator != 0.0 ? numerator / denominator : 0.0;
+            }
+            const SlopeWeights slopes = triangle_weights(x[1] - x[0], y[1] - y[0], x[2] - x[0], y[2] - y[0]);
+            dx = (corners[1] - corners[0]) * slopes.first_x + (corners[2] - corners[0]) * slopes.second_x;
+            dy = (corners[1] - corners[0]) * slopes.first_y + (corners[2] - corners[0]) * slopes.second_y;
+            c = corners[0] + dx * (record.x0 - x[0]) + dy * (record.y0 - y[0]);
+        }
+        planes[input] = {static_cast<float>(c), static_cast<float>(dx), static_cast<float>(dy), 0.0f};
+    }
+}
+
+inline void set_up_primitive(const DrawPlan& draw, const Record& record, const std::byte* vertex_memory,
+                             PrimitiveData& primitive) {
+    const auto vertex = [&](int i) {
+        return reinterpret_cast<const ScreenVertex*>(vertex_memory + static_cast<std::size_t>(record.vertex[i]) * 16);
+    };
+    primitive.x0 = record.x0, primitive.y0 = record.y0;
+    primitive.primitive_id = record.primitive_id;
+    primitive.front_facing = record.bits & Record::front_facing;
+    primitive.point_x = primitive.point_y = primitive.inverse_point_size = 0.0f;
+    primitive.layer = 0;
+    primitive.depth = {record.depth_c, record.depth_dx, record.depth_dy, 0.0f};
+
+    const ScreenVertex* vertices[3] = {vertex(0), vertex(0), vertex(0)};
+    const ScreenVertex* provoking = vertices[0];
+    SlopeWeights weights{};
+    switch (record.source()) {
+        case PlaneSource::homogeneous:
+            vertices[1] = vertex(1), vertices[2] = vertex(2);
+            homogeneous_planes(draw, record, vertices, primitive);
+            return;
+        case PlaneSource::window:
+            vertices[1] = vertex(1), vertices[2] = vertex(2);
+            weights = triangle_weights(static_cast<double>(vertices[1]->x) - vertices[0]->x,
+                                       static_cast<double>(vertices[1]->y) - vertices[0]->y,
+                                       static_cast<double>(vertices[2]->x) - vertices[0]->x,
+                                       static_cast<double>(vertices[2]->y) - vertices[0]->y);
+            break;
+        case PlaneSource::snapped: {
+            vertices[1] = vertex(1), vertices[2] = vertex(2);
+            const int second = record.bits & Record::swapped ? 2 : 1, third = 3 - second;
+            weights = triangle_weights((record.x[second] - record.x[0]) * (1.0 / subpixels),
+                                       (record.y[second] - record.y[0]) * (1.0 / subpixels),
+                                       (record.x[third] - record.x[0]) * (1.0 / subpixels),
+                                       (record.y[third] - record.y[0]) * (1.0 / subpixels));
+            break;
+        }
+        case PlaneSource::line:
+            vertices[1] = vertices[2] = vertex(1);
+            provoking = vertex(2);
+            weights = line_weights(static_cast<double>(vertices[1]->x) - vertices[0]->x,
+                                   static_cast<double>(vertices[1]->y) - vertices[0]->y);
+            break;
+        case PlaneSource::point: {
+            float size;
+            std::memcpy(&size, &record.vertex[1], sizeof(size));
+            primitive.point_x = vertices[0]->x - 0.5f * size;
+            primitive.point_y = vertices[0]->y - 0.5f * size;
+            primitive.inverse_point_size = 1.0f / size;
+            break;
+        }
+    }
+
+    const double w0 = vertices[0]->inverse_w;
+    const double dw1 = vertices[1]->inverse_w - w0, dw2 = vertices[2]->inverse_w - w0;
+    primitive.inverse_w = {vertices[0]->inverse_w,
+                           static_cast<float>(dw1 * weights.first_x + dw2 * weights.second_x),
+                           static_cast<float>(dw1 * weights.first_y + dw2 * weights.second_y), 0.0f};
+
+    const Float4 first_x = Float4{} + static_cast<float>(weights.first_x);
+    const Float4 second_x = Float4{} + static_cast<float>(weights.second_x);
+    const Float4 first_y = Float4{} + static_cast<float>(weights.first_y);
+    const Float4 second_y = Float4{} + static_cast<float>(weights.second_y);
+    const Float4 one = Float4{} + 1.0f;
+    Plane* planes = primitive.varyings();
+    for (std::uint32_t input = 0; input < draw.input_count; input += 4, planes += 4) {
+        Int4 linear, flat;
+        std::memcpy(&linear, draw.linear_masks + input, sizeof(linear));
+        std::memcpy(&flat, draw.flat_masks + input, sizeof(flat));
+        const Float4 value0 = load4(vertices[0]->inputs() + input) * select4(linear, one, Float4{} + vertices[0]->inverse_w);
+        const Float4 value1 = load4(vertices[1]->inputs() + input) * select4(linear, one, Float4{} + vertices[1]->inverse_w);
+        const Float4 value2 = load4(vertices[2]->inputs() + input) * select4(linear, one, Float4{} + vertices[2]->inverse_w);
+        const Float4 difference1 = value1 - value0, difference2 = value2 - value0;
+        store_planes(planes, value0, difference1 * first_x + difference2 * second_x,
+                     difference1 * first_y + difference2 * second_y, flat, load4(provoking->inputs() + input));
+    }
+}
+
+}  // namespace
+}  // namespace nacre::cpu::raster

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#elif defined(__aarch64__)
+#include <arm_neon.h>
+#endif
+
+/// @file
+/// Sixteen lanes of floats or integers in as many registers as the instruction set of the including file needs. Everything
+/// has internal linkage: each file that includes this is compiled for another instruction set.
+///
+/// Every operation gives the same bits on every instruction set.
+
+namespace nacre::cpu::raster {
+namespace {
+
+#define NACRE_LANES_INLINE [[gnu::always_inline]] inline
+
+#if defined(__AVX512F__)
+constexpr int register_lanes = 16;
+#elif defined(__AVX2__)
+constexpr int register_lanes = 8;
+#else
+constexpr int register_lanes = 4;
+#endif
+constexpr int registers = 16 / register_lanes;
+using FloatRegister [[gnu::vector_size(register_lanes * 4)]] = float;
+using IntRegister [[gnu::vector_size(register_lanes * 4)]] = std::int32_t;
+using UintRegister [[gnu::vector_size(register_lanes * 4)]] = std::uint32_t;
+
+struct Floats {
+    FloatRegister part[registers];
+};
+struct Ints {
+    IntRegister part[registers];
+};
+/// A truth value for each lane.
+struct Lanes {
+#if defined(__AVX512F__)
+    __mmask16 bits;
+#else
+    IntRegister part[registers];  ///< All bits or none.
+#endif
+};
+
+#define NACRE_EACH for (int i = 0; i < registers; ++i)
+
+NACRE_LANES_INLINE Floats floats(float value) {
+    Floats result;
+    NACRE_EACH result.part[i] = FloatRegister{} + value;
+    return result;
+}
+NACRE_LANES_INLINE Ints ints(std::int32_t value) {
+    Ints result;
+    NACRE_EACH result.part[i] = IntRegister{} + value;
+    return result;
+}
+NACRE_LANES_INLINE Floats load(const float* from) {
+    Floats result;
+    std::memcpy(&result, from, sizeof(result));
+    return result;
+}
+NACRE_LANES_INLINE Ints load(const std::int32_t* from) {
+    Ints result;
+    std::memcpy(&result, from, sizeof(result));
+    return result;
+}
+NACRE_LANES_INLINE Ints load(const std::uint32_t* from) {
+    Ints result;
+    std::memcpy(&result, from, sizeof(result));
+    return result;
+}
+NACRE_LANES_INLINE void store(float* to, const Floats& value) { std::memcpy(to, &value, sizeof(value)); }
+NACRE_LANES_INLINE void store(std::int32_t* to, const Ints& value) { std::memcpy(to, &value, sizeof(value)); }
+NACRE_LANES_INLINE void store(std::uint32_t* to, const Ints& value) { std::memcpy(to, &value, sizeof(value)); }
+NACRE_LANES_INLINE Ints bits_of(const Floats& value) { return __builtin_bit_cast(Ints, value); }
+NACRE_LANES_INLINE Floats floats_of_bits(const Ints& value) { return __builtin_bit_cast(Floats, value); }
+
+#define NACRE_BINARY(TYPE, OPERATOR)                                                    \
+    NACRE_LANES_INLINE TYPE operator OPERATOR(const TYPE& a, const TYPE& b) {           \
+        TYPE result;                                                                    \
+        NACRE_EACH result.part[i] = a.part[i] OPERATOR b.part[i];                       \
+        return result;                                                                  \
+    }
+NACRE_BINARY(Floats, +)
+NACRE_BINARY(Floats, -)
+NACRE_BINARY(Floats, *)
+NACRE_BINARY(Floats, /)
+NACRE_BINARY(Ints, &)
+NACRE_BINARY(Ints, |)
+NACRE_BINARY(Ints, ^)
+#undef NACRE_BINARY
+// Unsigned arithmetic underneath: integers wrap.
+#define NACRE_WRAPPING(OPERATOR)                                                                                     \
+    NACRE_LANES_INLINE Ints operator OPERATOR(const Ints& a, const Ints& b) {                                        \
+        Ints result;                                                                                                 \
+        NACRE_EACH result.part[i] = (IntRegister)((UintRegister)a.part[i] OPERATOR(UintRegister) b.part[i]);         \
+        return result;                                                                                               \
+    }
+NACRE_WRAPPING(+)
+NACRE_WRAPPING(-)
+NACRE_WRAPPING(*)
+#undef NACRE_WRAPPING
+NACRE_LANES_INLINE Ints operator~(const Ints& a) { return a ^ ints(-1); }
+template <int count>
+NACRE_LANES_INLINE Ints shift_left(const Ints& a) {
+    Ints result;
+    NACRE_EACH result.part[i] = (IntRegister)((UintRegister)a.part[i] << count);
+    return result;
+}
+/// Without sign.
+template <int count>
+NACRE_LANES_INLINE Ints shift_right(const Ints& a) {
+    Ints result;
+    NACRE_EACH result.part[i] = (IntRegister)((UintRegister)a.part[i] >> count);
+    return result;
+}
+NACRE_LANES_INLINE Ints shift_left(const Ints& a, int count) {
+    Ints result;
+    NACRE_EACH result.part[i] = (IntRegister)((UintRegister)a.part[i] << (UintRegister{} + static_cast<std::uint32_t>(count)));
+    return result;
+}
+NACRE_LANES_INLINE Ints shift_right(const Ints& a, int count) {
+    Ints result;
+    NACRE_EACH result.part[i] = (IntRegister)((UintRegister)a.part[i] >> (UintRegister{} + static_cast<std::uint32_t>(count)));
+    return result;
+}
+NACRE_LANES_INLINE Floats to_floats(const Ints& a) {
+    Floats result;
+    NACRE_EACH result.part[i] = __builtin_convertvector(a.part[i], FloatRegister);
+    return result;
+}
+/// To the nearest integer, halves to the even one. |a| < 2^31.
+NACRE_LANES_INLINE Ints round_to_ints(const Floats& a) {
+    Ints result;
+#if defined(__AVX512F__)
+    NACRE_EACH result.part[i] = (IntRegister)_mm512_cvtps_epi32(a.part[i]);
+#elif defined(__AVX2__)
+    NACRE_EACH result.part[i] = (IntRegister)_mm256_cvtps_epi32(a.part[i]);
+#elif defined(__x86_64__)
+    NACRE_EACH result.part[i] = (IntRegister)_mm_cvtps_epi32(a.part[i]);
+#elif defined(__aarch64__)
+    NACRE_EACH result.part[i] = (IntRegister)vcvtnq_s32_f32((float32x4_t)a.part[i]);
+#else
+    NACRE_EACH for (int j = 0; j < register_lanes; ++j) result.part[i][j] =
+        static_cast<std::int32_t>(__builtin_rintf(a.part[i][j]));
+#endif
+    return result;
+}
+
+// Comparisons of floats are false where one side is not a number.
+#if defined(__AVX512F__)
+NACRE_LANES_INLINE Lanes less(const Floats& a, const Floats& b) {
+    return {_mm512_cmp_ps_mask(a.part[0], b.part[0], _CMP_LT_OQ)};
+}
+NACRE_LANES_INLINE Lanes less_or_equal(const Floats& a, const Floats& b) {
+    return {_mm512_cmp_ps_mask(a.part[0], b.part[0], _CMP_LE_OQ)};
+}
+NACRE_LANES_INLINE Lanes less(const Ints& a, const Ints& b) {
+    return {_mm512_cmplt_epi32_mask((__m512i)a.part[0], (__m512i)b.part[0])};
+}
+NACRE_LANES_INLINE Lanes equal(const Ints& a, const Ints& b) {
+    return {_mm512_cmpeq_epi32_mask((__m512i)a.part[0], (__m512i)b.part[0])};
+}
+NACRE_LANES_INLINE Lanes not_negative(const Ints& a) {
+    return {static_cast<__mmask16>(~_mm512_movepi32_mask((__m512i)a.part[0]))};
+}
+NACRE_LANES_INLINE Lanes operator&(const Lanes& a, const Lanes& b) { return {static_cast<__mmask16>(a.bits & b.bits)}; }
+NACRE_LANES_INLINE Lanes operator|(const Lanes& a, const Lanes& b) { return {static_cast<__mmask16>(a.bits | b.bits)}; }
+NACRE_LANES_INLINE Lanes operator~(const Lanes& a) { return {static_cast<__mmask16>(~a.bits)}; }
+NACRE_LANES_INLINE std::uint32_t mask_of(const Lanes& a) { return a.bits; }
+NACRE_LANES_INLINE Lanes lanes_of(std::uint32_t mask) { return {static_cast<__mmask16>(mask)}; }
+NACRE_LANES_INLINE Ints select(const Lanes& which, const Ints& a, const Ints& b) {
+    return {(IntRegister)_mm512_mask_blend_epi32(which.bits, (__m512i)b.part[0], (__m512i)a.part[0])};
+}
+NACRE_LANES_INLINE Floats select(const Lanes& which, const Floats& a, const Floats& b) {
+    return {_mm512_mask_blend_ps(which.bits, b.part[0], a.part[0])};
+}
+#else
+#define NACRE_COMPARISON(NAME, TYPE, OPERATOR)                                                 \
+    NACRE_LANES_INLINE Lanes NAME(const TYPE& a, const TYPE& b) {                              \
+        Lanes result;                                                                          \
+        NACRE_EACH result.part[i] = (IntRegister)(a.part[i] OPERATOR b.part[i]);               \
+        return result;                                                                         \
+    }
+NACRE_COMPARISON(less, Floats, <)
+NACRE_COMPARISON(less_or_equal, Floats, <=)
+NACRE_COMPARISON(less, Ints, <)
+NACRE_COMPARISON(equal, Ints, ==)
+NACRE_COMPARISON(operator&, Lanes, &)
+NACRE_COMPARISON(operator|, Lanes, |)
+#undef NACRE_COMPARISON
+NACRE_LANES_INLINE Lanes operator~(const Lanes& a) {
+    Lanes result;
+    NACRE_EACH result.part[i] = ~a.part[i];
+    return result;
+}
+NACRE_LANES_INLINE Lanes not_negative(const Ints& a) {
+    Lanes result;
+    NACRE_EACH result.part[i] = (IntRegister)(a.part[i] >= IntRegister{});
+    return result;
+}
+NACRE_LANES_INLINE std::uint32_t mask_of(const Lanes& a) {
+    std::uint32_t mask = 0;
+#if defined(__AVX2__)
+    NACRE_EACH mask |= static_cast<std::uint32_t>(_mm256_movemask_ps((__m256)a.part[i])) << (8 * i);
+#elif defined(__x86_64__)
+    NACRE_EACH mask |= static_cast<std::uint32_t>(_mm_movemask_ps((__m128)a.part[i])) << (4 * i);
+#else
+    NACRE_EACH for (int j = 0; j < register_lanes; ++j) mask |= (a.part[i][j] & 1u) << (register_lanes * i + j);
+#endif
+    return mask;
+}
+alignas(64) constexpr std::int32_t lane_bits[16] = {1,      1 << 1, 1 << 2,  1 << 3,  1 << 4,  1 << 5,  1 << 6,  1 << 7,
+                                                    1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15};
+NACRE_LANES_INLINE Lanes lanes_of(std::uint32_t mask) {
+    const Ints own = load(lane_bits);
+    return equal(ints(static_cast<std::int32_t>(mask)) & own, own);
+}
+NACRE_LANES_INLINE Ints select(const Lanes& which, const Ints& a, const Ints& b) {
+    Ints result;
+    NACRE_EACH result.part[i] = (a.part[i] & which.part[i]) | (b.part[i] & ~which.part[i]);
+    return result;
+}
+NACRE_LANES_INLINE Floats select(const Lanes& which, const Floats& a, const Floats& b) {
+    return floats_of_bits(select(which, bits_of(a), bits_of(b)));
+}
+#endif
+
+NACRE_LANES_INLINE Lanes less(const Floats& a, float b) { return less(a, floats(b)); }
+/// `a` where it is below `b`; `b` where `a` is not a number.
+NACRE_LANES_INLINE Floats minimum(const Floats& a, const Floats& b) { return select(less(a, b), a, b); }
+NACRE_LANES_INLINE Floats maximum(const Floats& a, const Floats& b) { return select(less(b, a), a, b); }
+NACRE_LANES_INLINE Ints minimum(const Ints& a, const Ints& b) { return select(less(a, b), a, b); }
+NACRE_LANES_INLINE Ints maximum(const Ints& a, const Ints& b) { return select(less(b, a), a, b); }
+/// In [low, high]; `low` where `a` is not a number.
+NACRE_LANES_INLINE Floats clamp(const Floats& a, float low, float high) {
+    return minimum(maximum(a, floats(low)), floats(high));
+}
+NACRE_LANES_INLINE Floats absolute(const Floats& a) { return floats_of_bits(bits_of(a) & ints(0x7fffffff)); }
+
+#undef NACRE_EACH
+
+/// Four floats, as the rows of a vertex or plane.
+using Float4 [[gnu::vector_size(16)]] = float;
+using Int4 [[gnu::vector_size(16)]] = std::int32_t;
+
+NACRE_LANES_INLINE Float4 load4(const float* from) {
+    Float4 result;
+    std::memcpy(&result, from, sizeof(result));
+    return result;
+}
+NACRE_LANES_INLINE void store4(float* to, Float4 value) { std::memcpy(to, &value, sizeof(value)); }
+
+/// Rows become columns.
+NACRE_LANES_INLINE void transpose(Float4& a, Float4& b, Float4& c, Float4& d) {
+    const Float4 ab_low = __builtin_shufflevector(a, b, 0, 4, 1, 5), ab_high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    const Float4 cd_low = __builtin_shufflevector(c, d, 0, 4, 1, 5), cd_high = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+    a = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
+    b = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
+    c = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
+    d = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
+}
+
+}  // namespace
+}  // namespace nacre::cpu::raster

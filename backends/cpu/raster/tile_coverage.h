@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "backends/cpu/raster/tile_run.h"
+
+/// @file
+/// Which pixels and samples of a tile a triangle or line covers. Internal linkage, as in simd.h.
+///
+/// Edge functions are exact: E(x, y) = A * (x - x0) + B * (y - y0) in 64 bits with 8 subpixel bits on each side, less one for edges
+/// whose own pixels belong to the neighbor (top-left rule). Samples lie a whole number of pixels apart, so that the low 8 bits
+/// of E, which are the same in all of them, can be cut off (rounding down keeps the sign), and the rest fits 32 bits
+/// wherever the edge crosses the tile.
+
+namespace nacre::cpu::raster {
+namespace {
+
+/// Lanes of a block whose x (y) is at least, or at most, the index.
+constexpr std::uint32_t lanes_from_x[4] = {0xffff, 0xfafa, 0xf0f0, 0xa0a0}, lanes_to_x[4] = {0x0505, 0x0f0f, 0x5f5f, 0xffff};
+constexpr std::uint32_t lanes_from_y[4] = {0xffff, 0xffcc, 0xff00, 0xcc00}, lanes_to_y[4] = {0x0033, 0x00ff, 0x33ff, 0xffff};
+
+/// Lanes of block (x, y) inside of the pixels [x0, x1] x [y0, y1] of the tile; the block has some.
+NACRE_LANES_INLINE std::uint32_t lanes_inside(std::int32_t block_x, std::int32_t block_y, std::int32_t x0, std::int32_t x1,
+                                              std::int32_t y0, std::int32_t y1) {
+    const std::int32_t left = x0 - 4 * block_x, right = x1 - 4 * block_x;
+    const std::int32_t top = y0 - 4 * block_y, bottom = y1 - 4 * block_y;
+    std::uint32_t lanes = 0xffff;
+    if (left > 0) lanes &= lanes_from_x[left];
+    if (right < 3) lanes &= lanes_to_x[right];
+    if (top > 0) lanes &= lanes_from_y[top];
+    if (bottom < 3) lanes &= lanes_to_y[bottom];
+    return lanes;
+}
+
+template <bool multisampled>
+struct Coverage {
+    static constexpr std::uint32_t samples = multisampled ? 4 : 1;
+
+    TileRun& run;
+    // Edges that cross the tile inside of the triangle's bounds; the others are inside everywhere there.
+    std::int32_t a[3] = {}, b[3] = {}, e[3][samples] = {};
+    std::uint32_t edges = 0;
+    std::int32_t x0, x1, y0, y1;  ///< Pixels of the tile, inclusive.
+    bool bounded = false;         ///< Blocks may stick out of these without an edge that says so.
+    Ints steps[3];                ///< Edge function of each lane less that of the block's first.
+
+    /// @return whether anything may be covered
+    bool set_up() {
+        const Record& record = *run.record;
+        std::int32_t low_x = record.x[0], high_x = record.x[0], low_y = record.y[0], high_y = record.y[0];
+        for (int i = 1; i < 3; ++i) {
+            low_x = record.x[i] < low_x ? record.x[i] : low_x, high_x = record.x[i] > high_x ? record.x[i] : high_x;
+            low_y = record.y[i] < low_y ? record.y[i] : low_y, high_y = record.y[i] > high_y ? record.y[i] : high_y;
+        }
+        constexpr std::int32_t first = multisampled ? 32 : 128, last = multisampled ? 224 : 128;
+        x0 = ((low_x - last + subpixels - 1) >> subpixel_bits) - run.tile_x;
+        x1 = ((high_x - first) >> subpixel_bits) - run.tile_x;
+        y0 = ((low_y - last + subpixels - 1) >> subpixel_bits) - run.tile_y;
+        y1 = ((high_y - first) >> subpixel_bits) - run.tile_y;
+        const DrawPlan& draw = *run.draw;
+        const auto cut = [&](std::int32_t& low, std::int32_t& high, std::int32_t begin, std::int32_t end, std::int32_t size) {
+            begin = begin > 0 ? begin : 0, end = end < size ? end : size;
+            if (low < begin) low = begin, bounded = bounded || begin > 0;
+            if (high >= end) high = end - 1, bounded = bounded || end < tile_size;
+        };
+        cut(x0, x1, draw.x_begin - run.tile_x, draw.x_end - run.tile_x, run.width);
+        cut(y0, y1, draw.y_begin - run.tile_y, draw.y_end - run.tile_y, run.height);
+        if (x0 > x1 || y0 > y1) return false;
+
+        for (int i = 0; i < 3; ++i) {
+            const int next = i == 2 ? 0 : i + 1;
+            const std::int32_t edge_a = record.y[i] - record.y[next], edge_b = record.x[next] - record.x[i];
+            // Clockwise on the screen: left edges go up, top edges go right.
+            const bool owns_border = edge_a > 0 || (edge_a == 0 && edge_b > 0);
+            std::int64_t values[samples];
+            std::int64_t low = 0, high = 0;
+            for (std::uint32_t s = 0; s < samples; ++s) {
+                const std::int64_t x = run.tile_x * subpixels + (multisampled ? sample_offset_x[s] : subpixels / 2);
+                const std::int64_t y = run.tile_y * subpixels + (multisampled ? sample_offset_y[s] : subpixels / 2);
+                values[s] = (edge_a * (x - record.x[i]) + edge_b * (y - record.y[i]) - (owns_border ? 0 : 1)) >> subpixel_bits;
+                low = s == 0 || values[s] < low ? values[s] : low;
+                high = s == 0 || values[s] > high ? values[s] : high;
+            }
+            low += static_cast<std::int64_t>(edge_a) * (edge_a < 0 ? x1 : x0) +
+                   static_cast<std::int64_t>(edge_b) * (edge_b < 0 ? y1 : y0);
+            high += static_cast<std::int64_t>(edge_a) * (edge_a < 0 ? x0 : x1) +
+                    static_cast<std::int64_t>(edge_b) * (edge_b < 0 ? y0 : y1);
+            if (high < 0) return false;
+            if (low >= 0) {
+                bounded = true;
+                continue;
+            }
+            a[edges] = edge_a, b[edges] = edge_b;
+            for (std::uint32_t s = 0; s < samples; ++s) e[edges][s] = static_cast<std::int32_t>(values[s]);
+            ++edges;
+        }
+        for (std::uint32_t i = 0; i < 3; ++i) steps[i] = ints(a[i]) * load(lane_x) + ints(b[i]) * load(lane_y);
+        return true;
+    }
+
+    /// Lanes of the block that sample `s` covers, by the edges alone.
+    template <int edge_count>
+    [[gnu::always_inline]] std::uint32_t covered(std::int32_t block_x, std::int32_t block_y, std::uint32_t s) const {
+        Ints inside = steps[0] + ints(e[0][s] + a[0] * (4 * block_x) + b[0] * (4 * block_y));
+        if constexpr (edge_count > 1) inside = inside | (steps[1] + ints(e[1][s] + a[1] * (4 * block_x) + b[1] * (4 * block_y)));
+        if constexpr (edge_count > 2) inside = inside | (steps[2] + ints(e[2][s] + a[2] * (4 * block_x) + b[2] * (4 * block_y)));
+        return mask_of(not_negative(inside));
+    }
+
+    template <int edge_count>
+    void run_blocks(std::int32_t first_x, std::int32_t last_x, std::int32_t first_y, std::int32_t last_y) {
+        for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y)
+            for (std::int32_t block_x = first_x; block_x <= last_x; ++block_x) {
+                const std::uint32_t limit = bounded ? lanes_inside(block_x, block_y, x0, x1, y0, y1) : 0xffff;
+                std::uint32_t masks[samples];
+                std::uint32_t any = 0;
+                for (std::uint32_t s = 0; s < samples; ++s) {
+                    masks[s] = limit;
+                    if constexpr (edge_count > 0) masks[s] &= covered<edge_count>(block_x, block_y, s);
+                    any |= masks[s];
+                }
+                if (any) shade_block(block_x, block_y, masks);
+            }
+    }
+    void run_blocks(std::uint32_t edge_count, std::int32_t first_x, std::int32_t last_x, std::int32_t first_y,
+                    std::int32_t last_y) {
+        switch (edge_count) {
+            case 0: run_blocks<0>(first_x, last_x, first_y, last_y); break;
+            case 1: run_blocks<1>(first_x, last_x, first_y, last_y); break;
+            case 2: run_blocks<2>(first_x, last_x, first_y, last_y); break;
+            default: run_blocks<3>(first_x, last_x, first_y, last_y); break;
+        }
+    }
+
+    void draw_triangle() {
+        if (!set_up()) return;
+        const std::int32_t first_x = x0 / 4, last_x = x1 / 4, first_y = y0 / 4, last_y = y1 / 4;
+        const bool rejects = run.draw->hierarchical && run.depth;
+        const std::int32_t region_x = x0 / 16, region_y = y0 / 16;
+        if (region_x == x1 / 16 && region_y == y1 / 16) {
+            if (rejects && run.hidden(region_x, region_y, x0, x1, y0, y1)) return;
+            run_blocks(edges, first_x, last_x, first_y, last_y);
+            return;
+        }
+        for (std::int32_t y = region_y; y <= y1 / 16; ++y)
+            for (std::int32_t x = region_x; x <= x1 / 16; ++x) {
+                const std::int32_t left = x * 16 > x0 ? x * 16 : x0, right = x * 16 + 15 < x1 ? x * 16 + 15 : x1;
+                const std::int32_t top = y * 16 > y0 ? y * 16 : y0, bottom = y * 16 + 15 < y1 ? y * 16 + 15 : y1;
+                std::uint32_t crossing = 0;
+                bool outside = false;
+                for (std::uint32_t i = 0; i < edges; ++i) {
+                    std::int32_t low = e[i][0], high = e[i][0];
+                    for (std::uint32_t s = 1; s < samples; ++s) {
+                        low = e[i][s] < low ? e[i][s] : low, high = e[i][s] > high ? e[i][s] : high;
+                    }
+                    low += a[i] * (a[i] < 0 ? right : left) + b[i] * (b[i] < 0 ? bottom : top);
+                    high += a[i] * (a[i] < 0 ? left : right) + b[i] * (b[i] < 0 ? top : bottom);
+                    outside |= high < 0;
+                    crossing += low < 0;
+                }
+                if (outside || (rejects && run.hidden(x, y, left, right, top, bottom))) continue;
+                const bool was_bounded = bounded;
+                bounded = bounded || crossing == 0;
+                run_blocks(crossing == 0 ? 0 : edges, left / 4, right / 4, top / 4, bottom / 4);
+                bounded = was_bounded;
+            }
+    }
+
+    /// @param masks  for each sample the pixels of the block that it covers
+    void shade_block(std::int32_t block_x, std::int32_t block_y, std::uint32_t (&masks)[samples]) {
+        const DrawPlan& draw = *run.draw;
+        const std::uint32_t place = block_place(block_x, block_y);
+        const std::int32_t x = run.tile_x + 4 * block_x, y = run.tile_y + 4 * block_y;
+        std::uint32_t alive[samples];
+        std::uint32_t any = 0;
+        const bool tests = !draw.late_tests && (run.depth || run.stencil);
+        for (std::uint32_t s = 0; s < samples; ++s) {
+            alive[s] = masks[s];
+            if (tests || (draw.early_rejection && run.depth)) {
+                Ints key = ints(0);
+                if (run.depth) {
+                    const float offset_x = multisampled ? static_cast<float>(sample_offset_x[s]) / subpixels : 0.5f;
+                    const float offset_y = multisampled ? static_cast<float>(sample_offset_y[s]) / subpixels : 0.5f;
+                    key = run.key_at(floats(static_cast<float>(x) + offset_x) + to_floats(load(lane_x)),
+                                     floats(static_cast<float>(y) + offset_y) + to_floats(load(lane_y)));
+                }
+                std::int32_t* const depth = run.depth ? run.memory.depth[s] + place : nullptr;
+                if (tests) {
+                    alive[s] = test_lanes(draw.depth_stencil, run.front, key, masks[s], depth,
+                                          run.stencil ? run.memory.stencil[s] + place : nullptr);
+                    if (alive[s] && draw.depth_stencil.depth_write && run.depth) run.depth_written(block_x, block_y);
+                } else {
+                    alive[s] &= mask_of(compare(draw.depth_stencil.compare, key, load(depth)));
+                }
+            }
+            if (!draw.late_tests) run.memory.passed_samples += static_cast<std::uint32_t>(__builtin_popcount(alive[s]));
+            any |= alive[s];
+        }
+        if (any == 0 || !draw.shades) return;
+        for (std::uint32_t quad = 0; quad < 4; ++quad) {
+            const std::int32_t quad_x = x + 2 * static_cast<std::int32_t>(quad & 1);
+            const std::int32_t quad_y = y + 2 * static_cast<std::int32_t>(quad >> 1);
+            const std::uint32_t live = any >> (4 * quad) & 15;
+            if (live == 0) continue;
+            if constexpr (!multisampled) {
+                run.append(0, quad_x, quad_y, place + 4 * quad, live, nullptr, nullptr, quad);
+            } else {
+                std::uint32_t covered_samples[4] = {};
+                for (std::uint32_t i = 0; i < 4; ++i)
+                    for (std::uint32_t s = 0; s < samples; ++s)
+                        covered_samples[i] |= (masks[s] >> (4 * quad + i) & 1) << s;
+                if (!draw.runs_per_sample) {
+                    run.append(0, quad_x, quad_y, place + 4 * quad, live, covered_samples, alive, quad);
+                    continue;
+                }
+                for (std::uint32_t s = 0; s < samples; ++s)
+                    if (const std::uint32_t own = alive[s] >> (4 * quad) & 15)
+                        run.append(s, quad_x, quad_y, place + 4 * quad, own, covered_samples, alive, quad);
+            }
+        }
+    }
+};
+
+/// Lines of one sample: the pixels whose diamond the line leaves (Vulkan specification, "Bresenham Line Segment Rasterization").
+struct ThinLine {
+    Coverage<false> coverage;
+    std::int32_t block_x = -1, block_y = -1;
+    std::uint32_t lanes = 0;
+
+    void flush() {
+        if (lanes == 0) return;
+        std::uint32_t masks[1] = {lanes};
+        coverage.shade_block(block_x, block_y, masks);
+        lanes = 0;
+    }
+    void pixel(std::int32_t x, std::int32_t y) {
+        if (x / 4 != block_x || y / 4 != block_y) {
+            flush();
+            block_x = x / 4, block_y = y / 4;
+        }
+        lanes |= 1u << ((x & 1) | (y & 1) << 1 | (x & 2) << 1 | (y & 2) << 2);
+    }
+
+    static bool in_diamond(std::int32_t x, std::int32_t y) {
+        const std::int32_t from_x = (x & (subpixels - 1)) - subpixels / 2, from_y = (y & (subpixels - 1)) - subpixels / 2;
+        return (from_x < 0 ? -from_x : from_x) + (from_y < 0 ? -from_y : from_y) < subpixels / 2;
+    }
+
+    void draw() {
+        TileRun& run = coverage.run;
+        const Record& record = *run.record;
+        // Along the larger extent: one pixel for each column (or row) whose center the line passes.
+        const std::int64_t extent_x = static_cast<std::int64_t>(record.x[1]) - record.x[0];
+        const std::int64_t extent_y = static_cast<std::int64_t>(record.y[1]) - record.y[0];
+        const bool along_y = (extent_y < 0 ? -extent_y : extent_y) > (extent_x < 0 ? -extent_x : extent_x);
+        const std::int32_t* const major = along_y ? record.y : record.x;
+        const std::int32_t* const minor = along_y ? record.x : record.y;
+        const std::int32_t length = major[1] - major[0];
+        if (length == 0) return;
+        const std::int64_t rise = minor[1] - minor[0];
+        const bool forward = length > 0;
+        const std::int32_t start = major[0] >> subpixel_bits, end = major[1] >> subpixel_bits;
+        const auto center = [](std::int32_t column) { return column * subpixels + subpixels / 2; };
+        // The first column also counts where the line starts behind its center but inside of the diamond; the last only where the
+        // line comes out of the diamond.
+        const bool start_inside = in_diamond(record.x[0], record.y[0]), end_inside = in_diamond(record.x[1], record.y[1]);
+        const bool start_behind = forward ? major[0] > center(start) : major[0] < center(start);
+        const bool end_behind = forward ? major[1] > center(end) : major[1] < center(end);
+        const std::int32_t step = forward ? 1 : -1;
+        const std::int32_t first = start_behind && !start_inside ? start + step : start;
+        const std::int32_t last = end_behind && !end_inside ? end : end - step;
+
+        const DrawPlan& plan = *run.draw;
+        const auto cut = [](std::int32_t value, std::int32_t low, std::int32_t high) {
+            return value < low ? low : value > high ? high : value;
+        };
+        const std::int32_t x_begin = cut(plan.x_begin - run.tile_x, 0, run.width), x_end = cut(plan.x_end - run.tile_x, 0, run.width);
+        const std::int32_t y_begin = cut(plan.y_begin - run.tile_y, 0, run.height), y_end = cut(plan.y_end - run.tile_y, 0, run.height);
+        const std::int32_t major_tile = along_y ? run.tile_y : run.tile_x, minor_tile = along_y ? run.tile_x : run.tile_y;
+        const std::int32_t begin = major_tile + (along_y ? y_begin : x_begin), limit = major_tile + (along_y ? y_end : x_end) - 1;
+        const std::int32_t from = forward ? (first > begin ? first : begin) : (first < limit ? first : limit);
+        const std::int32_t to = forward ? (last < limit ? last : limit) : (last > begin ? last : begin);
+        for (std::int32_t column = from; forward ? column <= to : column >= to; column += step) {
+            std::int32_t row;
+            if (column == start && start_behind) {
+                row = minor[0] >> subpixel_bits;
+            } else {
+                std::int64_t numerator = static_cast<std::int64_t>(minor[0]) * length + (center(column) - major[0]) * rise;
+                std::int64_t denominator = static_cast<std::int64_t>(length) * subpixels;
+                if (denominator < 0) numerator = -numerator, denominator = -denominator;
+                std::int64_t quotient = numerator / denominator;
+                if (quotient * denominator > numerator) --quotient;
+                row = static_cast<std::int32_t>(quotient);
+            }
+            const std::int32_t x = (along_y ? row - minor_tile : column - major_tile);
+            const std::int32_t y = (along_y ? column - major_tile : row - minor_tile);
+            if (x >= x_begin && x < x_end && y >= y_begin && y < y_end) pixel(x, y);
+        }
+        flush();
+    }
+};
+
+}  // namespace
+}  // namespace nacre::cpu::raster

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compiled once for each instruction set, with NACRE_RASTER_KERNELS as the name of the result. Nothing here may have external
+// linkage but that name, and nothing from the standard library may be called that is not inlined for certain.
+#include "backends/cpu/raster/tile_coverage.h"
+#include "backends/cpu/raster/vertex_lanes.h"
+
+namespace nacre::cpu::raster {
+namespace {
+
+void draw_record(TileRun& run, const Record& record, const std::byte* vertices) {
+    run.begin_record(record, vertices);
+    if (record.bits & Record::thin_line) {
+        ThinLine{{run, {}, {}, {}, 0, 0, 0, 0, 0, false, {}}}.draw();
+    } else if (run.targets.samples > 1) {
+        Coverage<true>{run, {}, {}, {}, 0, 0, 0, 0, 0, false, {}}.draw_triangle();
+    } else {
+        Coverage<false>{run, {}, {}, {}, 0, 0, 0, 0, 0, false, {}}.draw_triangle();
+    }
+}
+
+void draw_tile(const TileJob& job, std::uint32_t tile, Workspace& workspace) {
+    TileRun run(job, tile, workspace);
+    for (std::uint32_t i = 0; i < job.chunk_count; ++i) {
+        const ChunkView& chunk = job.chunks[i];
+        const std::uint32_t* bin = nullptr;
+        const std::uint32_t* bin_end = nullptr;
+        if (chunk.bin_offsets) bin = chunk.bins + chunk.bin_offsets[tile], bin_end = chunk.bins + chunk.bin_offsets[tile + 1];
+        const std::uint32_t* large = chunk.large;
+        const std::uint32_t* const large_end = large + chunk.large_count;
+        while (bin != bin_end || large != large_end) {
+            const bool from_bin = large == large_end || (bin != bin_end && *bin < *large);
+            draw_record(run, chunk.records[from_bin ? *bin++ : *large++], chunk.vertices);
+        }
+    }
+    run.finish();
+}
+
+}  // namespace
+
+extern const Kernels NACRE_RASTER_KERNELS;
+const Kernels NACRE_RASTER_KERNELS = {NACRE_RASTER_NAME, finish_vertices, draw_tile};
+
+}  // namespace nacre::cpu::raster
