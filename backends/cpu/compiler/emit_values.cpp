@@ -7,17 +7,6 @@ namespace nacre::cpu {
 
 using spv::Op;
 
-namespace {
-
-/// Pure instructions whose results are no values of their own (pointers, images): made again wherever they are used.
-bool is_made_again(const Module& module, const Instruction& at) {
-    if (!at.type || !at.result) return false;
-    const Type& type = module.type(at.type);
-    return type.kind == TypeKind::pointer || type.is_opaque();
-}
-
-}  // namespace
-
 Component Emitter::zero(const Type& scalar) { return llvm::Constant::getNullValue(scalar_type(scalar)); }
 
 Value Emitter::constant(Id id) {

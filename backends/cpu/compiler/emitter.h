@@ -221,7 +221,7 @@ class Emitter {
     llvm::Value* effect_mask();
     /// Runs `body` for each different address in the lanes of `mask`: once where it is uniform.
     void for_each_different(const Component& address, llvm::Value* mask,
-                            const std::function<void(llvm::Value* address, llvm::Value* mask)>& body);
+                            const std::function<void(llvm::Value*, llvm::Value*)>& body);
     /// Runs `body` for each lane of `mask` in turn.
     void for_each_lane(llvm::Value* mask, const std::function<void(llvm::Value* lane)>& body);
 
@@ -229,7 +229,7 @@ class Emitter {
     virtual std::vector<Component> input_components(const Variable& variable) = 0;
     /// Base pointer and size of the workgroup's memory.
     virtual llvm::Value* workgroup_memory() { reject("workgroup memory outside of a compute shader"); }
-    void store_live(llvm::Value* mask) { builder.CreateStore(mask, live_slot); }
+    void store_live(llvm::Value* lanes_on) { builder.CreateStore(lanes_on, live_slot); }
     llvm::Value* live() { return builder.CreateLoad(mask_type, live_slot); }
 
     llvm::Module& target;
