@@ -93,10 +93,10 @@ void Transfer::generate_mips(const ImageView& view) {
                 const auto y = static_cast<std::uint32_t>(at % to.height);
                 const Taps rows = taps_of(y, from.height, to.height), slices = taps_of(z, from.depth, to.depth);
                 const auto source = [&](std::uint32_t slice, std::uint32_t line, float weight) {
-                    return std::pair<const std::byte*, float>(
-                        from.data + layer * from.layer_stride + slice * from.slice_stride +
-                            std::uint64_t{line} * from.row_stride,
-                        weight);
+                    return std::pair<const std::byte*, float>(from.data + layer * from.layer_stride +
+                                                                  slice * from.slice_stride +
+                                                                  std::uint64_t{line} * from.row_stride,
+                                                              weight);
                 };
                 const std::array sources{
                     source(slices.first, rows.first, (1.0f - slices.weight) * (1.0f - rows.weight)),
@@ -110,7 +110,8 @@ void Transfer::generate_mips(const ImageView& view) {
     }
 }
 
-void Transfer::resolve(const ImageView& source, const ImageView& destination, std::uint32_t width, std::uint32_t height) {
+void Transfer::resolve(const ImageView& source, const ImageView& destination, std::uint32_t width,
+                       std::uint32_t height) {
     const ImageLevel &from = source.levels[0], &to = destination.levels[0];
     const bool is_copy = source.samples == 1 || rhi::info(source.format).is_integer();
     const std::uint64_t row_cost = std::uint64_t{width} * (is_copy ? source.texel_bytes : sizeof(LinearTexel));
@@ -127,9 +128,11 @@ void Transfer::resolve(const ImageView& source, const ImageView& destination, st
             for (std::uint32_t x = 0; x < width; x += piece_texels) {
                 const std::uint32_t piece = std::min(piece_texels, width - x);
                 // Inside of surfaces all samples are the same.
-                const std::size_t bytes = std::size_t{piece} * source.texel_bytes, at = std::size_t{x} * source.texel_bytes;
+                const std::size_t bytes = std::size_t{piece} * source.texel_bytes,
+                                  at = std::size_t{x} * source.texel_bytes;
                 std::uint32_t same = 1;
-                while (same < source.samples && std::memcmp(texels + at, texels + same * from.sample_stride + at, bytes) == 0)
+                while (same < source.samples &&
+                       std::memcmp(texels + at, texels + same * from.sample_stride + at, bytes) == 0)
                     ++same;
                 if (same == source.samples && source.format == destination.format) {
                     std::memcpy(out + at, texels + at, bytes);

@@ -10,8 +10,9 @@
 #include "rhi/backend.h"
 
 /// @file
-/// Bind groups are flat arrays of descriptors, in the order of their layout: bindings in rising order, each with as many
-/// descriptors as it has elements. Unbounded arrays come last whatever their number, since their length is that of the group.
+/// Bind groups are flat arrays of descriptors, in the order of their layout: bindings in rising order, each with as
+/// many descriptors as it has elements. Unbounded arrays come last whatever their number, since their length is that of
+/// the group.
 
 namespace nacre::cpu {
 

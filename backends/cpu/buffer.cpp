@@ -11,8 +11,8 @@ Expected<std::unique_ptr<rhi::BackendBuffer>> CpuBuffer::create(const std::share
     buffer->block_ = MemoryBlock(memory, desc.size);
     if (!buffer->block_.data())
         return fail(ErrorCode::out_of_memory, "create buffer", fmt::format("'{}'", desc.name),
-                    fmt::format("{} bytes could not be had: the device holds {} of the {} bytes of this machine", desc.size,
-                                memory->reserved_bytes(), memory->capacity()),
+                    fmt::format("{} bytes could not be had: the device holds {} of the {} bytes of this machine",
+                                desc.size, memory->reserved_bytes(), memory->capacity()),
                     "Free other resources or use a smaller buffer.");
     buffer->desc = desc;
     if (desc.memory != rhi::MemoryKind::device) buffer->mapped = buffer->block_.data();

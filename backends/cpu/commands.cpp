@@ -18,8 +18,10 @@ void append(FlatPlan& plan, const void* data, std::size_t bytes) {
 
 bool is_executed(CommandType type) {
     switch (type) {
-        case CommandType::push_debug_group: case CommandType::pop_debug_group:
-        case CommandType::begin_statement: case CommandType::end_statement: return false;
+        case CommandType::push_debug_group:
+        case CommandType::pop_debug_group:
+        case CommandType::begin_statement:
+        case CommandType::end_statement: return false;
         default: return true;
     }
 }
@@ -83,7 +85,9 @@ void Executor::reset_state() {
 
 void Executor::execute(const CommandHeader& header, const std::byte* payload) {
     const auto as = [&]<typename T>(std::type_identity<T>) -> const T& { return *reinterpret_cast<const T*>(payload); };
-    const auto pool_of = [](const auto& command) -> CpuQueryPool& { return *static_cast<CpuQueryPool*>(command.pool.object); };
+    const auto pool_of = [](const auto& command) -> CpuQueryPool& {
+        return *static_cast<CpuQueryPool*>(command.pool.object);
+    };
 #define NACRE_COMMAND(type) as(std::type_identity<rhi::type>{})
     if (static_cast<std::uint16_t>(header.type) == begin_list_command) return reset_state();
     switch (header.type) {
@@ -93,11 +97,13 @@ void Executor::execute(const CommandHeader& header, const std::byte* payload) {
             pipeline_ = static_cast<CpuGraphicsPipeline*>(NACRE_COMMAND(SetGraphicsPipelineCommand).pipeline.object);
             return;
         case CommandType::set_compute_pipeline:
-            compute_pipeline_ = static_cast<CpuComputePipeline*>(NACRE_COMMAND(SetComputePipelineCommand).pipeline.object);
+            compute_pipeline_ =
+                static_cast<CpuComputePipeline*>(NACRE_COMMAND(SetComputePipelineCommand).pipeline.object);
             return;
         case CommandType::set_bind_group: {
             const auto& command = NACRE_COMMAND(SetBindGroupCommand);
-            if (command.index < groups_.size()) groups_[command.index] = static_cast<CpuBindGroup*>(command.group.object);
+            if (command.index < groups_.size())
+                groups_[command.index] = static_cast<CpuBindGroup*>(command.group.object);
             return;
         }
         case CommandType::set_push_constants: return set_push_constants(NACRE_COMMAND(SetPushConstantsCommand));
@@ -119,11 +125,14 @@ void Executor::execute(const CommandHeader& header, const std::byte* payload) {
         case CommandType::set_stencil_reference:
             stencil_reference_ = static_cast<std::uint8_t>(NACRE_COMMAND(SetStencilReferenceCommand).reference);
             return;
-        case CommandType::set_blend_constants: blend_constants_ = NACRE_COMMAND(SetBlendConstantsCommand).constants; return;
+        case CommandType::set_blend_constants:
+            blend_constants_ = NACRE_COMMAND(SetBlendConstantsCommand).constants;
+            return;
         case CommandType::draw: return draw(NACRE_COMMAND(DrawCommand).arguments, 0);
         case CommandType::draw_indexed: return draw_indexed(NACRE_COMMAND(DrawIndexedCommand).arguments, 0);
         case CommandType::draw_indirect: return draw_indirect(NACRE_COMMAND(DrawIndirectCommand));
-        case CommandType::draw_indexed_indirect: return draw_indexed_indirect(NACRE_COMMAND(DrawIndexedIndirectCommand));
+        case CommandType::draw_indexed_indirect:
+            return draw_indexed_indirect(NACRE_COMMAND(DrawIndexedIndirectCommand));
         case CommandType::dispatch: return dispatch(NACRE_COMMAND(DispatchCommand).groups);
         case CommandType::dispatch_indirect: return dispatch_indirect(NACRE_COMMAND(DispatchIndirectCommand));
         case CommandType::copy_buffer: return transfer_.copy_buffer(NACRE_COMMAND(CopyBufferCommand));

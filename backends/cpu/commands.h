@@ -14,8 +14,8 @@
 #include "backends/cpu/watchdog.h"
 
 /// @file
-/// Commands: a submission is copied on the caller's thread (streams belong to the caller) and executed on the queue's. Commands
-/// are carried out one after another, each on all threads, so barriers cost nothing.
+/// Commands: a submission is copied on the caller's thread (streams belong to the caller) and executed on the queue's.
+/// Commands are carried out one after another, each on all threads, so barriers cost nothing.
 
 namespace nacre::cpu {
 

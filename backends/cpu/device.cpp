@@ -49,7 +49,8 @@ rhi::AdapterInfo describe_machine() {
     return machine;
 }
 
-CpuDevice::CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc& desc, std::unique_ptr<Compiler> compiler)
+CpuDevice::CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc& desc,
+                     std::unique_ptr<Compiler> compiler)
     : adapter_(describe_machine()),
       // Results must not depend on the lanes where arithmetic is consistent, so neither may the subgroup.
       capabilities_(find_capabilities(options.mode == ExecutionMode::consistent ? max_lanes : options.lanes)),
@@ -70,8 +71,8 @@ Expected<std::unique_ptr<rhi::BackendDevice>> CpuDevice::create(const DeviceOpti
                                 options.lanes, device->scheduler_->thread_count()));
     return device;
 } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::out_of_memory, "create device", fmt::format("'{}'", desc.desc->name), "there is no memory for it",
-                "Free other resources.");
+    return fail(ErrorCode::out_of_memory, "create device", fmt::format("'{}'", desc.desc->name),
+                "there is no memory for it", "Free other resources.");
 } catch (const std::system_error& error) {
     return fail(ErrorCode::out_of_memory, "create device", fmt::format("'{}'", desc.desc->name),
                 fmt::format("the system starts no more threads: {}", error.what()), "Use fewer threads (threads=N).");

@@ -60,8 +60,8 @@ class CpuDevice : public rhi::BackendDevice {
   private:
     CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc& desc, std::unique_ptr<Compiler> compiler);
     Expected<void> check_lost(const char* attempted) const;
-    /// Gives the device up and wakes everyone who waits. From then on the queue touches no object of the front end, which may
-    /// destroy them as soon as it hears of the loss: only called where the queue runs nothing.
+    /// Gives the device up and wakes everyone who waits. From then on the queue touches no object of the front end,
+    /// which may destroy them as soon as it hears of the loss: only called where the queue runs nothing.
     void lose(const std::string& reason);
     void run_plan(const FlatPlan& plan);
 

@@ -8,8 +8,8 @@
 
 namespace nacre::cpu {
 
-/// Calls `part(first, count)` for parts that make up [0, total), on all threads of a scheduler; on the caller's alone where the
-/// work is too small to be worth the start.
+/// Calls `part(first, count)` for parts that make up [0, total), on all threads of a scheduler; on the caller's alone
+/// where the work is too small to be worth the start.
 /// @param bytes_each  bytes that one element moves
 template <typename Part>
 void in_parallel(Scheduler& scheduler, std::uint64_t total, std::uint64_t bytes_each, Part&& part) {

@@ -79,8 +79,7 @@ void Executor::write_timestamp(CpuQueryPool& pool, std::uint32_t index) {
         look_at_watchdog(pass_shaders_);
     }
     const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    pool.values[index] =
-        static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
+    pool.values[index] = static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
 }
 
 }  // namespace nacre::cpu

@@ -32,7 +32,8 @@ class TbbScheduler : public Scheduler {
     explicit TbbScheduler(std::uint32_t threads) : thread_count_(threads), arena_(static_cast<int>(threads)) {
         // oneTBB starts no more threads than the machine has cores, unless it is told that more are wanted.
         if (threads > static_cast<std::uint32_t>(tbb::info::default_concurrency()))
-            more_threads_ = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, threads);
+            more_threads_ =
+                std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, threads);
     }
 
     [[nodiscard]] std::uint32_t thread_count() const override { return thread_count_; }
@@ -46,12 +47,13 @@ class TbbScheduler : public Scheduler {
             return;
         }
         arena_.execute([&] {
-            // One loop for each thread, which takes indices in rising order: tasks of very different length balance, and
-            // nothing is paid for splitting ranges.
+            // One loop for each thread, which takes indices in rising order: tasks of very different length balance,
+            // and nothing is paid for splitting ranges.
             tbb::parallel_for(
                 std::uint32_t{0}, loops, std::uint32_t{1},
                 [&](std::uint32_t) {
-                    run_tasks(next, count, static_cast<std::uint32_t>(tbb::this_task_arena::current_thread_index()), task);
+                    run_tasks(next, count, static_cast<std::uint32_t>(tbb::this_task_arena::current_thread_index()),
+                              task);
                 },
                 tbb::simple_partitioner());
         });
@@ -66,8 +68,8 @@ class TbbScheduler : public Scheduler {
 }  // namespace
 
 std::unique_ptr<Scheduler> Scheduler::create(std::uint32_t threads) {
-    return std::make_unique<TbbScheduler>(threads ? threads
-                                                  : static_cast<std::uint32_t>(std::max(1, tbb::info::default_concurrency())));
+    return std::make_unique<TbbScheduler>(
+        threads ? threads : static_cast<std::uint32_t>(std::max(1, tbb::info::default_concurrency())));
 }
 
 #endif

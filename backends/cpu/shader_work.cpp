@@ -115,8 +115,8 @@ void Executor::draw_indexed(const rhi::DrawIndexedArguments& arguments, std::uin
 
 void Executor::draw_indirect(const rhi::DrawIndirectCommand& command) {
     for (std::uint32_t i = 0; i < command.count && stopped_.empty(); ++i) {
-        const auto arguments = read_arguments<rhi::DrawArguments>(
-            command.arguments, command.offset + std::uint64_t{i} * command.stride);
+        const auto arguments =
+            read_arguments<rhi::DrawArguments>(command.arguments, command.offset + std::uint64_t{i} * command.stride);
         if (!arguments) return;
         draw(*arguments, i);
     }

@@ -8,8 +8,8 @@
 
 namespace nacre::cpu {
 
-/// Rounding to nearest, and subnormal numbers kept, whatever the program has set in the thread; restored at the end. Results
-/// must not depend on the thread that computes them.
+/// Rounding to nearest, and subnormal numbers kept, whatever the program has set in the thread; restored at the end.
+/// Results must not depend on the thread that computes them.
 class DefaultArithmetic {
   public:
     DefaultArithmetic() {

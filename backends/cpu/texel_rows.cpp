@@ -35,7 +35,8 @@ const std::array<float, 256>& srgb_bytes() {
     return table;
 }
 
-/// The nearest of 256 codes; NaN counts as 0. Adding 1.5 * 2^23 leaves the rounded value (to even) in the low bits of the float.
+/// The nearest of 256 codes; NaN counts as 0. Adding 1.5 * 2^23 leaves the rounded value (to even) in the low bits of
+/// the float.
 std::uint8_t unorm_byte(float value) {
     const float clamped = value > 0.0f ? std::min(value, 1.0f) : 0.0f;
     return static_cast<std::uint8_t>(std::bit_cast<std::uint32_t>(clamped * 255.0f + 12582912.0f));
@@ -104,12 +105,14 @@ bool converts_halves() {
     return has_f16c;
 }
 
-__attribute__((target("f16c"))) void decode_four_halves(const std::byte* texels, std::uint32_t count, LinearTexel* out) {
+__attribute__((target("f16c"))) void decode_four_halves(const std::byte* texels, std::uint32_t count,
+                                                        LinearTexel* out) {
     for (std::uint32_t i = 0; i < count; ++i)
         _mm_storeu_ps(out[i].data(), _mm_cvtph_ps(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(texels + i * 8))));
 }
 
-__attribute__((target("f16c"))) void encode_four_halves(const LinearTexel* texels, std::uint32_t count, std::byte* out) {
+__attribute__((target("f16c"))) void encode_four_halves(const LinearTexel* texels, std::uint32_t count,
+                                                        std::byte* out) {
     for (std::uint32_t i = 0; i < count; ++i)
         _mm_storel_epi64(reinterpret_cast<__m128i*>(out + i * 8),
                          _mm_cvtps_ph(_mm_loadu_ps(texels[i].data()), _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC));

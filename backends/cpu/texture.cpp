@@ -63,12 +63,13 @@ Expected<std::unique_ptr<rhi::BackendTexture>> CpuTexture::create(const std::sha
     texture->block_ = MemoryBlock(memory, bytes);
     std::byte* const data = texture->block_.data();
     if (!data)
-        return fail(ErrorCode::out_of_memory, "create texture", fmt::format("'{}'", desc.name),
-                    fmt::format("{} bytes for {}x{}x{} texels, {} layers, {} mips, {} samples of {} could not be had: the "
-                                "device holds {} of the {} bytes of this machine",
-                                bytes, desc.width, desc.height, desc.depth, desc.layers, desc.mips, desc.samples, facts.name,
-                                memory->reserved_bytes(), memory->capacity()),
-                    "Free other resources or use a smaller texture.");
+        return fail(
+            ErrorCode::out_of_memory, "create texture", fmt::format("'{}'", desc.name),
+            fmt::format("{} bytes for {}x{}x{} texels, {} layers, {} mips, {} samples of {} could not be had: the "
+                        "device holds {} of the {} bytes of this machine",
+                        bytes, desc.width, desc.height, desc.depth, desc.layers, desc.mips, desc.samples, facts.name,
+                        memory->reserved_bytes(), memory->capacity()),
+            "Free other resources or use a smaller texture.");
     for (std::uint32_t mip = 0; mip < desc.mips; ++mip) {
         whole.levels[mip].data = data + offsets[mip];
         if (facts.has_stencil) whole.stencil_levels[mip].data = data + stencil_offsets[mip];

@@ -14,8 +14,8 @@ namespace nacre::cpu {
 /// Bytes between the texels, or the blocks, of a format in memory.
 std::uint32_t stored_texel_bytes(rhi::Format format);
 
-/// Texels in the layout of image_view.h: mips one after another, in each the layers, in each layer the samples and slices.
-/// The stencil plane, where there is one, lies behind all mips of depth.
+/// Texels in the layout of image_view.h: mips one after another, in each the layers, in each layer the samples and
+/// slices. The stencil plane, where there is one, lies behind all mips of depth.
 class CpuTexture : public rhi::BackendTexture {
   public:
     static Expected<std::unique_ptr<rhi::BackendTexture>> create(const std::shared_ptr<HostMemory>& memory,
@@ -43,6 +43,8 @@ class CpuTexture : public rhi::BackendTexture {
 };
 
 /// The texture behind a resolved reference.
-inline CpuTexture& texture_of(const rhi::TextureReference& reference) { return *static_cast<CpuTexture*>(reference.object); }
+inline CpuTexture& texture_of(const rhi::TextureReference& reference) {
+    return *static_cast<CpuTexture*>(reference.object);
+}
 
 }  // namespace nacre::cpu

@@ -35,16 +35,14 @@ void Transfer::copy_buffer(const rhi::CopyBufferCommand& command) {
         std::memmove(to, from, command.size);
         return;
     }
-    in_parallel(scheduler_, command.size, 1, [&](std::uint64_t first, std::uint64_t count) {
-        std::memcpy(to + first, from + first, count);
-    });
+    in_parallel(scheduler_, command.size, 1,
+                [&](std::uint64_t first, std::uint64_t count) { std::memcpy(to + first, from + first, count); });
 }
 
 void Transfer::fill_buffer(const rhi::FillBufferCommand& command) {
     auto* words = reinterpret_cast<std::uint32_t*>(buffer_of(command.buffer).data() + command.offset);
-    in_parallel(scheduler_, command.size / 4, 4, [&](std::uint64_t first, std::uint64_t count) {
-        std::fill_n(words + first, count, command.value);
-    });
+    in_parallel(scheduler_, command.size / 4, 4,
+                [&](std::uint64_t first, std::uint64_t count) { std::fill_n(words + first, count, command.value); });
 }
 
 void Transfer::copy_buffer_to_texture(const rhi::CopyBufferToTextureCommand& command) {
@@ -94,15 +92,17 @@ void Transfer::copy_texture(const rhi::CopyTextureCommand& command) {
         const BoxRows to = rows_of(to_level, region.destination_layer, region.destination_offset, edge, texel_bytes);
         const std::uint64_t row_bytes = std::uint64_t{(region.extent.width + edge - 1) / edge} * texel_bytes;
         const std::uint64_t layer_rows = rows * region.extent.depth;
-        in_parallel(scheduler_, layer_rows * region.layer_count, row_bytes, [&](std::uint64_t first, std::uint64_t count) {
-            for (std::uint64_t at = first; at < first + count; ++at) {
-                const std::uint64_t layer = at / layer_rows, slice = at % layer_rows / rows, row = at % rows;
-                std::memmove(
-                    to.first + layer * to_level.layer_stride + slice * to.slice_stride + row * to.row_stride,
-                    from.first + layer * from_level.layer_stride + slice * from.slice_stride + row * from.row_stride,
-                    row_bytes);
-            }
-        });
+        in_parallel(
+            scheduler_, layer_rows * region.layer_count, row_bytes, [&](std::uint64_t first, std::uint64_t count) {
+                for (std::uint64_t at = first; at < first + count; ++at) {
+                    const std::uint64_t layer = at / layer_rows, slice = at % layer_rows / rows, row = at % rows;
+                    std::memmove(
+                        to.first + layer * to_level.layer_stride + slice * to.slice_stride + row * to.row_stride,
+                        from.first + layer * from_level.layer_stride + slice * from.slice_stride +
+                            row * from.row_stride,
+                        row_bytes);
+                }
+            });
     };
     const ImageView &from = source.whole(), &to = destination.whole();
     copy_plane(from.levels[region.source_mip], to.levels[region.destination_mip], from.texel_bytes);

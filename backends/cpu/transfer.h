@@ -9,8 +9,8 @@
 /// @file
 /// Copies, clears, resolves and mip generation. One at a time; large ones use all threads of the scheduler.
 ///
-/// Buffers hold the depth of depth-stencil formats alone, 4 bytes for each texel (24-bit depth in the low bits). Copies between
-/// textures take the stencil with them.
+/// Buffers hold the depth of depth-stencil formats alone, 4 bytes for each texel (24-bit depth in the low bits). Copies
+/// between textures take the stencil with them.
 
 namespace nacre::cpu {
 
@@ -29,8 +29,9 @@ class Transfer {
     void clear_depth(const ImageView& view, float depth);
     void clear_stencil(const ImageView& view, std::uint8_t stencil);
 
-    /// Mips 1 and up of every layer from mip 0, each from the one above: the average of 2x2 texels (2x2x2 of a volume). Where a
-    /// size is odd, the two texels nearest to the place are weighted by their distance, as in a scaling blit of other APIs.
+    /// Mips 1 and up of every layer from mip 0, each from the one above: the average of 2x2 texels (2x2x2 of a volume).
+    /// Where a size is odd, the two texels nearest to the place are weighted by their distance, as in a scaling blit of
+    /// other APIs.
     void generate_mips(const ImageView& view);
 
     /// The average of a texel's samples, or the first sample of integer formats.

@@ -14,11 +14,12 @@
 
 namespace nacre::cpu {
 
-/// The limit that NACRE_CPU_WATCHDOG_SECONDS in the environment sets: 10 s where it is not set or no number, 0 for none.
+/// The limit that NACRE_CPU_WATCHDOG_SECONDS in the environment sets: 10 s where it is not set or no number, 0 for
+/// none.
 std::chrono::nanoseconds watchdog_limit();
 
-/// Watches one thread's steps. A step costs two atomic writes; a thread of its own wakes up only while one runs that began a
-/// limit ago.
+/// Watches one thread's steps. A step costs two atomic writes; a thread of its own wakes up only while one runs that
+/// began a limit ago.
 class Watchdog {
   public:
     explicit Watchdog(std::chrono::nanoseconds limit);
@@ -51,8 +52,8 @@ class Watchdog {
 
     const std::chrono::nanoseconds limit_;
     ExecutionState state_{};
-    std::atomic<Clock::rep> began_{0};    ///< When the running step began, as the clock counts; 0: none runs.
-    std::atomic<bool> is_asleep_{true};   ///< The thread waits for a step to begin.
+    std::atomic<Clock::rep> began_{0};   ///< When the running step began, as the clock counts; 0: none runs.
+    std::atomic<bool> is_asleep_{true};  ///< The thread waits for a step to begin.
     std::mutex mutex_;
     std::condition_variable changed_;
     bool ending_ = false;

@@ -35,8 +35,9 @@ void fill(const ImageView& view, std::uint32_t mip, std::uint32_t seed) {
 double channel(const ImageView& view, std::uint32_t mip, std::uint32_t x, std::uint32_t y, std::uint32_t z,
                std::uint32_t sample, std::uint32_t layer, std::size_t c, double* step = nullptr) {
     const ImageLevel& level = view.levels[mip];
-    const std::byte* texel = level.data + layer * level.layer_stride + sample * level.sample_stride + z * level.slice_stride +
-                             std::uint64_t{y} * level.row_stride + std::uint64_t{x} * view.texel_bytes;
+    const std::byte* texel = level.data + layer * level.layer_stride + sample * level.sample_stride +
+                             z * level.slice_stride + std::uint64_t{y} * level.row_stride +
+                             std::uint64_t{x} * view.texel_bytes;
     const test::TexelValue value = test::decode_texel(view.format, std::span(texel, view.texel_bytes));
     if (step) *step = value.step[c];
     return value.channels[c];
@@ -84,7 +85,8 @@ void expect_mips(const ImageView& view) {
                             const double found = channel(view, mip, x, y, z, 0, layer, c, &step);
                             const double expected = expected_mip(view, mip, {x, y, z}, layer, c);
                             ASSERT_NEAR(found, expected, step * 0.51 + std::abs(expected) * 1e-6 + 1e-30)
-                                << rhi::info(view.format).name << ", mip " << mip << " at " << x << ", " << y << ", " << z;
+                                << rhi::info(view.format).name << ", mip " << mip << " at " << x << ", " << y << ", "
+                                << z;
                         }
 }
 
@@ -112,11 +114,20 @@ TEST(Mips, OfAnyShapeAreInterpolatedAtTheirCenters) {
           rhi::TextureDesc{.format = Format::rgba8_srgb, .width = 1021, .height = 3, .mips = 10},
           rhi::TextureDesc{.format = Format::bgra8_unorm, .width = 1, .height = 700, .mips = 10},
           rhi::TextureDesc{.format = Format::r32_float, .width = 515, .height = 259, .mips = 10},
-          rhi::TextureDesc{.dimension = TextureDimension::d1, .format = Format::rg32_float, .width = 77, .layers = 3, .mips = 7},
-          rhi::TextureDesc{.dimension = TextureDimension::d3, .format = Format::rgba16_float, .width = 9, .height = 6, .depth = 5,
-                           .mips = 4},
-          rhi::TextureDesc{.dimension = TextureDimension::cube, .format = Format::rg8_unorm, .width = 12, .height = 12,
-                           .layers = 6, .mips = 4}}) {
+          rhi::TextureDesc{
+              .dimension = TextureDimension::d1, .format = Format::rg32_float, .width = 77, .layers = 3, .mips = 7},
+          rhi::TextureDesc{.dimension = TextureDimension::d3,
+          .format = Format::rgba16_float,
+          .width = 9,
+          .height = 6,
+          .depth = 5,
+          .mips = 4},
+          rhi::TextureDesc{.dimension = TextureDimension::cube,
+          .format = Format::rg8_unorm,
+          .width = 12,
+          .height = 12,
+          .layers = 6,
+          .mips = 4}}) {
         const auto texture = make(desc);
         fill(texture->whole(), 0, desc.width);
         transfer.generate_mips(texture->whole());
@@ -176,7 +187,8 @@ TEST(Resolves, SeeWhereOneSampleOfOneTexelDiffers) {
         level.data[sample * level.sample_stride + 301 + 170] = std::byte{80};
         transfer.resolve(source->whole(), destination->whole(), 301, 3);
         for (std::uint32_t i = 0; i < 903; ++i)
-            ASSERT_EQ(destination->whole().levels[0].data[i], i == 301 + 170 ? std::byte{50} : std::byte{40}) << sample << ", " << i;
+            ASSERT_EQ(destination->whole().levels[0].data[i], i == 301 + 170 ? std::byte{50} : std::byte{40})
+                << sample << ", " << i;
     }
 }
 
@@ -188,7 +200,8 @@ TEST(Resolves, TakeTheFirstSampleOfIntegers) {
     fill(source->whole(), 0, 4);
     transfer.resolve(source->whole(), destination->whole(), 33, 7);
     EXPECT_EQ(std::memcmp(source->whole().levels[0].data, destination->whole().levels[0].data, 33 * 7 * 8), 0);
-    EXPECT_NE(std::memcmp(source->whole().levels[0].data + 33 * 7 * 8, destination->whole().levels[0].data, 33 * 7 * 8), 0);
+    EXPECT_NE(std::memcmp(source->whole().levels[0].data + 33 * 7 * 8, destination->whole().levels[0].data, 33 * 7 * 8),
+              0);
 }
 
 TEST(Resolves, TouchNothingBesideThePass) {

@@ -59,20 +59,23 @@ TEST(BindGroups, NumberTheSlotsOfEachSet) {
 TEST(BindGroups, HoldRangesViewsAndSamplers) {
     const auto memory = std::make_shared<HostMemory>(std::uint64_t{1} << 30);
     auto buffer = *CpuBuffer::create(memory, {.size = 1000, .usage = rhi::BufferUsage::storage});
-    auto texture = *CpuTexture::create(memory, {.format = rhi::Format::rgba8_unorm, .width = 8, .height = 8, .mips = 4});
+    auto texture =
+        *CpuTexture::create(memory, {.format = rhi::Format::rgba8_unorm, .width = 8, .height = 8, .mips = 4});
     CpuSampler sampler({.mip_bias = 2.5f});
     CpuBindGroupLayout layout({.bindings = {{0, BindingType::storage_buffer, 1, ShaderStage::compute},
                                             {1, BindingType::combined_texture_sampler, 2, ShaderStage::compute},
                                             {2, BindingType::sampled_texture, 0, ShaderStage::compute}}},
                               100);
     std::vector<rhi::BackendBinding> bindings(4);
-    bindings[0] = {.binding = 0, .type = BindingType::storage_buffer, .buffer = buffer.get(), .offset = 64, .size = 100};
+    bindings[0] = {
+        .binding = 0, .type = BindingType::storage_buffer, .buffer = buffer.get(), .offset = 64, .size = 100};
     rhi::ViewReference view;
     view.format = rhi::Format::rgba8_unorm;
     view.mip_count = 2;
     view.base_mip = 1;
     view.texture.object = texture.get();
-    bindings[1] = {.binding = 1, .element = 1, .type = BindingType::combined_texture_sampler, .view = view, .sampler = &sampler};
+    bindings[1] = {
+        .binding = 1, .element = 1, .type = BindingType::combined_texture_sampler, .view = view, .sampler = &sampler};
     // The unbounded array is as long as its highest element; nothing is bound between.
     bindings[2] = {.binding = 2, .element = 0, .type = BindingType::sampled_texture, .view = view};
     bindings[3] = {.binding = 2, .element = 5, .type = BindingType::sampled_texture, .view = view};
@@ -99,10 +102,12 @@ TEST(BindGroups, HoldRangesViewsAndSamplers) {
 
 TEST(Pipelines, LinkInputsToOutputsByLocationAndComponent) {
     VertexProgram vertex;
-    vertex.outputs = {{.location = 0, .component = 0, .slot = 13}, {.location = 0, .component = 1, .slot = 14},
+    vertex.outputs = {{.location = 0, .component = 0, .slot = 13},
+                      {.location = 0, .component = 1, .slot = 14},
                       {.location = 2, .component = 3, .slot = 20}};
     FragmentProgram fragment;
-    fragment.inputs = {{.location = 2, .component = 3}, {.location = 0, .component = 1}, {.location = 1, .component = 0}};
+    fragment.inputs = {
+        {.location = 2, .component = 3}, {.location = 0, .component = 1}, {.location = 1, .component = 0}};
     EXPECT_EQ(link_inputs(vertex, fragment), (std::vector<std::uint32_t>{20, 14, ~0u}));
 }
 

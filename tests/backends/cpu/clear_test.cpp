@@ -61,7 +61,8 @@ TEST_F(Clears, SetEveryColorFormat) {
         for (std::size_t at = 0; at < bytes.size(); at += facts.block_bytes) {
             const test::TexelValue found = test::decode_texel(format, bytes.subspan(at, facts.block_bytes));
             for (std::size_t c = 0; c < 4; ++c)
-                EXPECT_NEAR(found.channels[c], expected[c], found.step[c] * 0.501 + (facts.is_integer() ? 0.0 : 1e-7)) << c;
+                EXPECT_NEAR(found.channels[c], expected[c], found.step[c] * 0.501 + (facts.is_integer() ? 0.0 : 1e-7))
+                    << c;
         }
     }
     EXPECT_GE(formats, 40);
@@ -89,8 +90,12 @@ TEST_F(Clears, LeaveOtherMipsAndLayersAlone) {
 TEST_F(Clears, SetAllSamplesSlicesAndLargeTextures) {
     for (const rhi::TextureDesc& desc :
          {rhi::TextureDesc{.format = Format::rg32_uint, .width = 7, .height = 9, .samples = 4},
-          rhi::TextureDesc{.dimension = rhi::TextureDimension::d3, .format = Format::rg32_uint, .width = 7, .height = 9,
-                           .depth = 5, .mips = 3},
+          rhi::TextureDesc{.dimension = rhi::TextureDimension::d3,
+          .format = Format::rg32_uint,
+          .width = 7,
+          .height = 9,
+          .depth = 5,
+          .mips = 3},
           rhi::TextureDesc{.format = Format::rg32_uint, .width = 701, .height = 301, .layers = 2}}) {
         const auto texture = make(desc);
         transfer.clear_color(texture->whole(), {.uint = {5, 6, 0, 0}});
@@ -112,7 +117,8 @@ TEST_F(Clears, SetAllSamplesSlicesAndLargeTextures) {
 }
 
 TEST_F(Clears, SetDepthAndStencilApart) {
-    for (const Format format : {Format::d16_unorm, Format::d32_float, Format::d24_unorm_s8_uint, Format::d32_float_s8_uint}) {
+    for (const Format format :
+         {Format::d16_unorm, Format::d32_float, Format::d24_unorm_s8_uint, Format::d32_float_s8_uint}) {
         SCOPED_TRACE(rhi::info(format).name);
         const auto texture = make({.format = format, .width = 3, .height = 2, .samples = 4});
         const ImageView& whole = texture->whole();

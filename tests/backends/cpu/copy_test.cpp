@@ -37,14 +37,19 @@ TEST(Copies, OfBuffersSmallAndLarge) {
 
 TEST(Copies, OfBoxesInVolumesWithPaddedRows) {
     const auto device = make_device();
-    const rhi::TextureDesc desc{.dimension = rhi::TextureDimension::d3, .format = Format::r16_uint, .width = 7, .height = 6,
-                                .depth = 5, .usage = copies, .name = "volume"};
+    const rhi::TextureDesc desc{.dimension = rhi::TextureDimension::d3,
+                                .format = Format::r16_uint,
+                                .width = 7,
+                                .height = 6,
+                                .depth = 5,
+                                .usage = copies,
+                                .name = "volume"};
     const rhi::Texture volume = ok(device->create_texture(desc));
     const auto content = random_bytes(2000, 2);
     const rhi::Buffer from = make_buffer(*device, 2000), to = make_buffer(*device, 2000);
     ok(device->write_buffer(from, std::span<const std::byte>(content)));
-    rhi::BufferTextureCopy region{.buffer_offset = 8, .bytes_per_row = 12, .rows_per_slice = 7, .offset = {2, 1, 1},
-                                  .extent = {4, 3, 3}};
+    rhi::BufferTextureCopy region{
+        .buffer_offset = 8, .bytes_per_row = 12, .rows_per_slice = 7, .offset = {2, 1, 1}, .extent = {4, 3, 3}};
     rhi::CommandList list = device->create_command_list();
     list.clear_texture(volume, {.uint = {77, 0, 0, 0}});
     list.copy_buffer_to_texture(from, volume, region);
@@ -74,15 +79,16 @@ TEST(Copies, OfBlocks) {
     for (const Format format : {Format::bc1_rgba_unorm, Format::bc5_rg_snorm, Format::bc7_rgba_srgb}) {
         const std::uint32_t bytes = rhi::info(format).block_bytes;
         // 18x10 texels are 5x3 blocks, the last of each row and column cut.
-        const rhi::TextureDesc desc{.format = format, .width = 18, .height = 10, .layers = 2, .mips = 2, .usage = copies,
-                                    .name = "blocks"};
+        const rhi::TextureDesc desc{
+            .format = format, .width = 18, .height = 10, .layers = 2, .mips = 2, .usage = copies, .name = "blocks"};
         const rhi::Texture first = ok(device->create_texture(desc)), second = ok(device->create_texture(desc));
         const auto content = random_bytes(std::uint64_t{15} * bytes, 3);
         ok(device->write_texture(first, content, 0, 1));
         EXPECT_TRUE(ok(device->read_texture(first, 0, 1)) == content);
         rhi::CommandList list = device->create_command_list();
-        list.copy_texture(first, second, {.source_layer = 1, .source_offset = {0, 4, 0}, .destination_offset = {8, 4, 0},
-                                          .extent = {8, 6, 1}});
+        list.copy_texture(
+            first, second,
+            {.source_layer = 1, .source_offset = {0, 4, 0}, .destination_offset = {8, 4, 0}, .extent = {8, 6, 1}});
         run(*device, std::move(list));
         const auto copied = ok(device->read_texture(second));
         for (std::uint32_t y = 0; y < 3; ++y)
@@ -97,8 +103,11 @@ TEST(Copies, OfBlocks) {
 
 TEST(Copies, OfDepthLeaveTheStencilAlone) {
     const auto device = make_device();
-    const rhi::TextureDesc desc{.format = Format::d24_unorm_s8_uint, .width = 4, .height = 2,
-                                .usage = copies | TextureUsage::depth_target, .name = "depth"};
+    const rhi::TextureDesc desc{.format = Format::d24_unorm_s8_uint,
+                                .width = 4,
+                                .height = 2,
+                                .usage = copies | TextureUsage::depth_target,
+                                .name = "depth"};
     const rhi::Texture texture = ok(device->create_texture(desc));
     // The upper bits of 24-bit depth say nothing.
     const std::vector<std::uint32_t> codes{0xff123456, 0, 0x00ffffff, 0xabcdef01, 7, 8, 9, 0x80000001};
@@ -121,7 +130,8 @@ TEST(Copies, BetweenDepthTexturesTakeTheStencilAlong) {
     rhi::CopyTextureCommand command{};
     command.source.object = source.get();
     command.destination.object = destination.get();
-    command.region = {.source_layer = 1, .source_offset = {1, 1, 0}, .destination_offset = {2, 0, 0}, .extent = {2, 3, 1}};
+    command.region = {
+        .source_layer = 1, .source_offset = {1, 1, 0}, .destination_offset = {2, 0, 0}, .extent = {2, 3, 1}};
     transfer.copy_texture(command);
     for (std::uint32_t y = 0; y < 4; ++y)
         for (std::uint32_t x = 0; x < 4; ++x) {

@@ -40,7 +40,8 @@ inline void ok(const Expected<void>& value) {
 }
 
 /// A device that fails the test with every message of validation.
-inline std::unique_ptr<rhi::Device> make_device(const std::string& backend = "cpu:threads=3", rhi::DeviceDesc desc = {}) {
+inline std::unique_ptr<rhi::Device> make_device(const std::string& backend = "cpu:threads=3",
+                                                rhi::DeviceDesc desc = {}) {
     desc.backend = backend;
     auto device = ok(instance().create_device(desc));
     if (device)
@@ -72,14 +73,15 @@ inline rhi::ComputePipeline make_compute(rhi::Device& device, const std::string&
 }
 
 inline rhi::BindGroup bind(rhi::Device& device, rhi::ComputePipeline pipeline, rhi::Buffer buffer) {
-    return ok(device.create_bind_group({.layout = ok(device.bind_group_layout(pipeline, 0)),
-                                        .entries = {{.binding = 0, .buffer = buffer}}}));
+    return ok(device.create_bind_group(
+        {.layout = ok(device.bind_group_layout(pipeline, 0)), .entries = {{.binding = 0, .buffer = buffer}}}));
 }
 
 inline rhi::Buffer make_buffer(rhi::Device& device, std::uint64_t size) {
     using enum rhi::BufferUsage;
-    return ok(device.create_buffer(
-        {.size = size, .usage = storage | indirect | vertex | index | copy_source | copy_destination, .name = "buffer"}));
+    return ok(device.create_buffer({.size = size,
+                                    .usage = storage | indirect | vertex | index | copy_source | copy_destination,
+                                    .name = "buffer"}));
 }
 
 /// Sets the pipeline, its group and push constants of zero.
@@ -89,9 +91,7 @@ inline void prepare(rhi::Device& device, rhi::CommandList& list, rhi::ComputePip
     list.set_push_constants(std::array<std::uint32_t, 4>{});
 }
 
-inline void run(rhi::Device& device, rhi::CommandList list) {
-    ok(device.wait(ok(device.submit(std::move(list)))));
-}
+inline void run(rhi::Device& device, rhi::CommandList list) { ok(device.wait(ok(device.submit(std::move(list))))); }
 
 template <typename T>
 std::vector<T> as_values(const std::vector<std::byte>& bytes) {

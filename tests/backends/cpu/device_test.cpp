@@ -33,7 +33,9 @@ TEST(CpuBackends, TakeModesLanesAndThreads) {
         EXPECT_EQ(FakePrograms::last_options.lanes, one.lanes) << one.spec;
         EXPECT_EQ(device->capabilities().subgroup_size, one.subgroup) << one.spec;
     }
-    for (const auto& [spec, text] : {std::pair{"cpu:lanes=5", "5"}, {"cpu:lanes=32", "4, 8 or 16"}, {"cpu:slow", "slow"},
+    for (const auto& [spec, text] : {std::pair{"cpu:lanes=5", "5"},
+                                     {"cpu:lanes=32", "4, 8 or 16"},
+                                     {"cpu:slow", "slow"},
                                      {"cpu:threads=100000", "100000"}}) {
         const auto device = instance().create_device({.backend = spec});
         ASSERT_FALSE(device) << spec;

@@ -34,8 +34,14 @@ TEST(Dispatches, RunEachWorkgroupOnce) {
     for (const char* backend : {"cpu:threads=1", "cpu:threads=4"}) {
         const auto device = make_device(backend);
         const auto pipeline = make_compute(*device, "count.comp", count_workgroups);
-        for (const auto& [x, y, z] : {std::array<std::uint32_t, 3>{1, 1, 1}, {1, 1, 9}, {5000, 1, 1}, {7, 11, 13}, {2, 900, 1},
-                                      {3, 1, 500}, {0, 4, 4}, {4, 0, 4}}) {
+        for (const auto& [x, y, z] : {std::array<std::uint32_t, 3>{1, 1, 1},
+                                      {1, 1, 9},
+                                      {5000, 1, 1},
+                                      {7, 11, 13},
+                                      {2, 900, 1},
+                                      {3, 1, 500},
+                                      {0, 4, 4},
+                                      {4, 0, 4}}) {
             const std::uint64_t total = std::uint64_t{x} * y * z;
             const rhi::Buffer buffer = make_buffer(*device, std::max<std::uint64_t>(total, 1) * 4 + 4);
             rhi::CommandList list = device->create_command_list();
@@ -55,7 +61,8 @@ TEST(Dispatches, ReadIndirectArgumentsWithinTheBuffer) {
     device->set_message_callback([](const rhi::Message&) {});
     const auto pipeline = make_compute(*device, "count.comp", count_workgroups);
     const rhi::Buffer buffer = make_buffer(*device, 256), arguments = make_buffer(*device, 32);
-    ok(device->write_buffer(arguments, std::span<const std::uint32_t>(std::array<std::uint32_t, 8>{9, 9, 9, 9, 3, 5, 2, 9})));
+    ok(device->write_buffer(arguments,
+                            std::span<const std::uint32_t>(std::array<std::uint32_t, 8>{9, 9, 9, 9, 3, 5, 2, 9})));
     const auto submit = [&](std::uint64_t offset) {
         rhi::CommandList list = device->create_command_list();
         prepare(*device, list, pipeline, buffer);
@@ -139,7 +146,8 @@ TEST(Dispatches, ThatDoNotEndLoseTheDevice) {
     EXPECT_THAT(waited.error().message(), testing::HasSubstr("endless.comp"));
     EXPECT_THAT(waited.error().message(), testing::HasSubstr("0.1 s"));
     EXPECT_TRUE(device->is_lost());
-    EXPECT_EQ(device->create_buffer({.size = 4, .usage = rhi::BufferUsage::storage}).error().code, ErrorCode::device_lost);
+    EXPECT_EQ(device->create_buffer({.size = 4, .usage = rhi::BufferUsage::storage}).error().code,
+              ErrorCode::device_lost);
     device->destroy(buffer);
     device.reset();
 
@@ -172,8 +180,8 @@ TEST(Dispatches, OfAbsurdIndirectCountsAreStoppedToo) {
 
 TEST(Dispatches, ThatRunOutOfMemoryLoseTheDevice) {
     const auto device = make_device();
-    const auto pipeline = make_compute(*device, "greedy.comp", [](const ShaderContext*, const WorkgroupRange*) {},
-                                       std::uint64_t{1} << 60);
+    const auto pipeline = make_compute(
+        *device, "greedy.comp", [](const ShaderContext*, const WorkgroupRange*) {}, std::uint64_t{1} << 60);
     rhi::CommandList list = device->create_command_list();
     prepare(*device, list, pipeline, make_buffer(*device, 64));
     list.dispatch({1, 1, 1});
@@ -215,9 +223,10 @@ TEST(Dispatches, RunWhileTheCallerGoesOn) {
 TEST(Dispatches, SeeNothingOfTheListBefore) {
     // Without validation, which demands that all constants are set.
     const auto device = make_device("cpu", {.validation = false});
-    const auto pipeline = make_compute(*device, "constants.comp", [](const ShaderContext* context, const WorkgroupRange*) {
-        std::memcpy(values(*context), context->push_constants, 16);
-    });
+    const auto pipeline =
+        make_compute(*device, "constants.comp", [](const ShaderContext* context, const WorkgroupRange*) {
+            std::memcpy(values(*context), context->push_constants, 16);
+        });
     const rhi::Buffer buffer = make_buffer(*device, 16);
     ok(device->write_buffer(buffer, std::span<const std::uint32_t>(std::array<std::uint32_t, 4>{9, 9, 9, 9})));
     rhi::CommandList first = device->create_command_list();

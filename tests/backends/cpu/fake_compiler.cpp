@@ -12,7 +12,9 @@ std::map<std::string, FragmentProgram> fragment_programs;
 
 class FakeCompiler : public Compiler {
   public:
-    Expected<ComputeProgram> compile_compute(const ShaderSource& source) override { return find(compute_programs, source); }
+    Expected<ComputeProgram> compile_compute(const ShaderSource& source) override {
+        return find(compute_programs, source);
+    }
     Expected<VertexProgram> compile_vertex(const ShaderSource& source, const VertexInput&) override {
         return find(vertex_programs, source);
     }
@@ -40,7 +42,9 @@ CompilerOptions FakePrograms::last_options;
 
 void FakePrograms::set(const std::string& name, ComputeProgram program) { compute_programs[name] = std::move(program); }
 void FakePrograms::set(const std::string& name, VertexProgram program) { vertex_programs[name] = std::move(program); }
-void FakePrograms::set(const std::string& name, FragmentProgram program) { fragment_programs[name] = std::move(program); }
+void FakePrograms::set(const std::string& name, FragmentProgram program) {
+    fragment_programs[name] = std::move(program);
+}
 
 Expected<std::unique_ptr<Compiler>> Compiler::create(const CompilerOptions& options) {
     FakePrograms::last_options = options;

@@ -6,8 +6,8 @@
 #include "backends/cpu/compiler/compiler.h"
 
 /// @file
-/// A compiler that compiles nothing: the program of a shader is the one that was set for the shader's name. What it was asked
-/// for is kept.
+/// A compiler that compiles nothing: the program of a shader is the one that was set for the shader's name. What it was
+/// asked for is kept.
 
 namespace nacre::cpu {
 

@@ -30,7 +30,7 @@ struct Rasterizer::State {
     }
 };
 
-Rasterizer::Rasterizer(Scheduler&, std::uint32_t) : state_(std::make_unique<State>()) {}
+Rasterizer::Rasterizer(Scheduler&, std::uint32_t, const RasterizerOptions&) : state_(std::make_unique<State>()) {}
 Rasterizer::~Rasterizer() = default;
 
 void Rasterizer::begin_pass(const RenderTargets& targets) {

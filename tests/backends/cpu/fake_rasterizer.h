@@ -8,8 +8,8 @@
 #include "backends/cpu/raster/rasterizer.h"
 
 /// @file
-/// A rasterizer that draws nothing by itself: it keeps what it was told, as late as a rasterizer may that collects draws, and
-/// paints as the test says.
+/// A rasterizer that draws nothing by itself: it keeps what it was told, as late as a rasterizer may that collects
+/// draws, and paints as the test says.
 
 namespace nacre::cpu {
 
@@ -22,8 +22,8 @@ struct FakeDraw {
 struct FakeRaster {
     /// Called for each draw when it is carried out.
     static std::function<void(const RenderTargets&, const FakeDraw&)> paint;
-    static std::vector<FakeDraw> draws;         ///< Carried out so far.
-    static std::vector<RenderTargets> passes;   ///< Begun so far.
+    static std::vector<FakeDraw> draws;        ///< Carried out so far.
+    static std::vector<RenderTargets> passes;  ///< Begun so far.
     static void forget();
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Render passes over a rasterizer of the test's own: targets, load and store operations, resolves, and the state of draws.
+// Render passes over a rasterizer of the test's own: targets, load and store operations, resolves, and the state of
+// draws.
 #include <stdlib.h>
 
 #include <atomic>
@@ -32,7 +33,8 @@ struct RenderPasses : testing::Test {
             layout(push_constant) uniform Parameters { uint value; };
             layout(location = 0) in vec4 place;
             void main() { gl_Position = place * float(value); })");
-        desc.fragment = make_shader(*device, "draw.frag", "layout(location = 0) out vec4 color; void main() { color = vec4(1); }");
+        desc.fragment =
+            make_shader(*device, "draw.frag", "layout(location = 0) out vec4 color; void main() { color = vec4(1); }");
         desc.vertex_buffers = {{.stride = 16}};
         desc.vertex_attributes = {{.location = 0, .buffer = 0, .offset = 0, .format = Format::rgba32_float}};
         desc.color_targets = {{.format = format}};
@@ -42,11 +44,17 @@ struct RenderPasses : testing::Test {
     }
     rhi::Texture target(Format format, std::uint32_t width, std::uint32_t height, std::uint32_t samples = 1,
                         std::uint32_t layers = 1, std::uint32_t mips = 1) {
-        return ok(device->create_texture(
-            {.format = format, .width = width, .height = height, .layers = layers, .mips = mips, .samples = samples,
-             .usage = samples > 1 ? TextureUsage::color_target
-                                  : TextureUsage::color_target | TextureUsage::copy_source | TextureUsage::copy_destination,
-             .name = "target"}));
+        return ok(
+            device->create_texture({.format = format,
+                                    .width = width,
+                                    .height = height,
+                                    .layers = layers,
+                                    .mips = mips,
+                                    .samples = samples,
+                                    .usage = samples > 1 ? TextureUsage::color_target
+                                                         : TextureUsage::color_target | TextureUsage::copy_source |
+                                                               TextureUsage::copy_destination,
+                                    .name = "target"}));
     }
 };
 
@@ -55,7 +63,8 @@ TEST_F(RenderPasses, LoadClearAndKeepTheirTargets) {
     rhi::CommandList list = device->create_command_list();
     list.clear_texture(first, {.floating = {1, 1, 1, 1}});
     list.clear_texture(second, {.uint = {5, 0, 0, 0}});
-    list.begin_render_pass({.color = {{.view = rhi::TextureView::subresource(first, 1, 1), .load = LoadOperation::clear,
+    list.begin_render_pass({.color = {{.view = rhi::TextureView::subresource(first, 1, 1),
+                                       .load = LoadOperation::clear,
                                        .clear = {.floating = {0, 1, 0, 1}}},
                                       {.view = second, .load = LoadOperation::load}}});
     list.end_render_pass();
@@ -75,15 +84,21 @@ TEST_F(RenderPasses, LoadClearAndKeepTheirTargets) {
 
 TEST_F(RenderPasses, ClearDepthAndStencilUnlessTheyAreReadOnly) {
     const rhi::Texture depth = ok(device->create_texture(
-        {.format = Format::d32_float_s8_uint, .width = 4, .height = 4,
-         .usage = TextureUsage::depth_target | TextureUsage::copy_destination | TextureUsage::copy_source, .name = "depth"}));
+        {.format = Format::d32_float_s8_uint,
+         .width = 4,
+         .height = 4,
+         .usage = TextureUsage::depth_target | TextureUsage::copy_destination | TextureUsage::copy_source,
+         .name = "depth"}));
     const auto stencils = [&] {
         const ImageLevel& level = FakeRaster::passes.back().depth_stencil.stencil_levels[0];
         return std::vector<std::byte>(level.data, level.data + 16);
     };
     rhi::CommandList list = device->create_command_list();
-    list.begin_render_pass({.depth_stencil = {.view = depth, .depth_load = LoadOperation::clear, .clear_depth = 0.25f,
-                                              .stencil_load = LoadOperation::clear, .clear_stencil = 3}});
+    list.begin_render_pass({.depth_stencil = {.view = depth,
+                                              .depth_load = LoadOperation::clear,
+                                              .clear_depth = 0.25f,
+                                              .stencil_load = LoadOperation::clear,
+                                              .clear_stencil = 3}});
     list.end_render_pass();
     run(*device, std::move(list));
     for (const float value : as_values<float>(ok(device->read_texture(depth)))) EXPECT_EQ(value, 0.25f);
@@ -174,7 +189,8 @@ TEST_F(RenderPasses, GiveEachDrawItsState) {
 TEST_F(RenderPasses, ReadIndirectDraws) {
     const rhi::Texture picture = target(Format::r8_unorm, 4, 4);
     const auto drawn = pipeline(Format::r8_unorm);
-    const rhi::Buffer vertices = make_buffer(*device, 256), arguments = make_buffer(*device, 96), indices = make_buffer(*device, 64);
+    const rhi::Buffer vertices = make_buffer(*device, 256), arguments = make_buffer(*device, 96),
+                      indices = make_buffer(*device, 64);
     ok(device->write_buffer(arguments, std::span<const std::uint32_t>(std::array<std::uint32_t, 15>{
                                            3, 1, 0, 0, 99, 4, 2, 1, 9, 99, /* indexed: */ 6, 1, 2, 0xfffffffeu, 3})));
     rhi::CommandList list = device->create_command_list();

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "backends/cpu/scheduler.h"
+
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -9,7 +11,6 @@
 #include <vector>
 
 #include "backends/cpu/queue.h"
-#include "backends/cpu/scheduler.h"
 #include "backends/cpu/thread_pool.h"
 
 namespace nacre::cpu {
@@ -21,7 +22,8 @@ struct Kind {
 };
 constexpr Kind kinds[]{
     {"usual", [](std::uint32_t threads) { return Scheduler::create(threads); }},
-    {"plain", [](std::uint32_t threads) -> std::unique_ptr<Scheduler> { return std::make_unique<ThreadPool>(threads); }},
+    {"plain",
+     [](std::uint32_t threads) -> std::unique_ptr<Scheduler> { return std::make_unique<ThreadPool>(threads); }},
 };
 
 class Schedulers : public testing::TestWithParam<Kind> {};

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rows against single texels: whatever is done for speed gives what one texel at a time gives.
-#include "backends/cpu/texel_rows.h"
-
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -11,6 +9,7 @@
 #include <vector>
 
 #include "backends/cpu/images/texel_formats.h"
+#include "backends/cpu/texel_rows.h"
 
 namespace nacre::cpu {
 namespace {
@@ -33,7 +32,8 @@ TEST(TexelRows, DecodeEveryCodeAsSingleTexelsAre) {
         std::vector<std::byte> texels(std::size_t{count} * bytes);
         for (std::uint32_t at = 0; at < count; ++at)
             for (std::uint32_t byte = 0; byte < bytes; ++byte)
-                texels[std::size_t{at} * bytes + byte] = static_cast<std::byte>((at + byte / 2 * 12289) >> (byte % 2 * 8));
+                texels[std::size_t{at} * bytes + byte] =
+                    static_cast<std::byte>((at + byte / 2 * 12289) >> (byte % 2 * 8));
         std::vector<LinearTexel> row(count);
         decode_row(format, texels.data(), count, row.data());
         for (std::uint32_t at = 0; at < count; ++at) {
@@ -51,7 +51,8 @@ TEST(TexelRows, EncodeNumbersAsSingleTexelsAre) {
     constexpr std::uint32_t count = 20'000;
     std::vector<LinearTexel> row(count);
     for (std::uint32_t at = 0; at < count; ++at)
-        for (float& channel : row[at]) channel = at % 3 == 0 ? wide(random) : at % 3 == 1 ? unit(random) : std::ldexp(unit(random), -20);
+        for (float& channel : row[at])
+            channel = at % 3 == 0 ? wide(random) : at % 3 == 1 ? unit(random) : std::ldexp(unit(random), -20);
     const float specials[]{0.0f, -0.0f, 1.0f, NAN, INFINITY, -INFINITY, 65504.0f, 65520.0f, 1e-8f, 3e38f, 0.5f};
     for (std::size_t at = 0; at < std::size(specials); ++at) row[at].fill(specials[at]);
     for (std::uint32_t i = 1; i < rhi::format_count; ++i) {
@@ -85,7 +86,8 @@ TEST(TexelRows, FillAnyTexelSize) {
             std::vector<std::byte> row(std::size_t{count} * bytes + 16, std::byte{77});
             fill_row(source.data(), bytes, count, row.data());
             for (std::size_t i = 0; i < row.size(); ++i)
-                ASSERT_EQ(row[i], i < std::size_t{count} * bytes ? source[i % bytes] : std::byte{77}) << bytes << ", " << count;
+                ASSERT_EQ(row[i], i < std::size_t{count} * bytes ? source[i % bytes] : std::byte{77})
+                    << bytes << ", " << count;
         }
 }
 

@@ -36,8 +36,18 @@ TEST(TextureLayout, GivesEveryTexelItsOwnZeroedPlace) {
         {.dimension = TextureDimension::d1, .format = Format::r8_unorm, .width = 13, .layers = 3, .mips = 4},
         {.format = Format::rgba8_unorm, .width = 13, .height = 7, .layers = 5, .mips = 4},
         {.format = Format::rgba32_float, .width = 5, .height = 5, .samples = 4},
-        {.dimension = TextureDimension::d3, .format = Format::rg16_float, .width = 7, .height = 5, .depth = 9, .mips = 4},
-        {.dimension = TextureDimension::cube, .format = Format::r16_uint, .width = 8, .height = 8, .layers = 12, .mips = 4},
+        {.dimension = TextureDimension::d3,
+         .format = Format::rg16_float,
+         .width = 7,
+         .height = 5,
+         .depth = 9,
+         .mips = 4},
+        {.dimension = TextureDimension::cube,
+         .format = Format::r16_uint,
+         .width = 8,
+         .height = 8,
+         .layers = 12,
+         .mips = 4},
         {.format = Format::bc1_rgba_unorm, .width = 18, .height = 10, .layers = 2, .mips = 5},
         {.format = Format::bc7_rgba_srgb, .width = 20, .height = 12},
         {.format = Format::d24_unorm_s8_uint, .width = 9, .height = 4, .layers = 2, .mips = 2},
@@ -81,8 +91,12 @@ TEST(TextureLayout, GivesEveryTexelItsOwnZeroedPlace) {
 
 TEST(TextureLayout, ViewsBeginAtTheirMipAndLayer) {
     const auto memory = std::make_shared<HostMemory>(std::uint64_t{1} << 30);
-    const rhi::TextureDesc desc{.dimension = TextureDimension::cube, .format = Format::rgba8_unorm, .width = 16,
-                                .height = 16, .layers = 12, .mips = 5};
+    const rhi::TextureDesc desc{.dimension = TextureDimension::cube,
+                                .format = Format::rgba8_unorm,
+                                .width = 16,
+                                .height = 16,
+                                .layers = 12,
+                                .mips = 5};
     auto made = CpuTexture::create(memory, desc);
     ASSERT_TRUE(made);
     auto& texture = static_cast<CpuTexture&>(**made);
@@ -110,7 +124,8 @@ TEST(TextureLayout, ViewsBeginAtTheirMipAndLayer) {
 
 TEST(TextureLayout, SaysWhatItWantedWhenMemoryRunsOut) {
     const auto memory = std::make_shared<HostMemory>(1000);
-    const auto made = CpuTexture::create(memory, {.format = Format::rgba8_unorm, .width = 100, .height = 20, .name = "big"});
+    const auto made =
+        CpuTexture::create(memory, {.format = Format::rgba8_unorm, .width = 100, .height = 20, .name = "big"});
     ASSERT_FALSE(made);
     EXPECT_EQ(made.error().code, ErrorCode::out_of_memory);
     EXPECT_NE(made.error().message().find("100x20"), std::string::npos) << made.error().message();

@@ -53,8 +53,14 @@ TEST(Watchdogs, WithoutALimitNeverExpire) {
 TEST(Watchdogs, ReadTheirLimitFromTheEnvironment) {
     ::unsetenv("NACRE_CPU_WATCHDOG_SECONDS");
     EXPECT_EQ(watchdog_limit(), 10s);
-    for (const auto& [text, limit] : {std::pair<const char*, std::chrono::nanoseconds>{"0.25", 250ms}, {"0", 0s}, {"60", 60s},
-                                      {"many", 10s}, {"", 10s}, {"-3", 10s}, {"5 s", 10s}, {"nan", 10s}}) {
+    for (const auto& [text, limit] : {std::pair<const char*, std::chrono::nanoseconds>{"0.25", 250ms},
+                                      {"0", 0s},
+                                      {"60", 60s},
+                                      {"many", 10s},
+                                      {"", 10s},
+                                      {"-3", 10s},
+                                      {"5 s", 10s},
+                                      {"nan", 10s}}) {
         ::setenv("NACRE_CPU_WATCHDOG_SECONDS", text, 1);
         EXPECT_EQ(watchdog_limit(), limit) << text;
     }
