@@ -184,6 +184,8 @@ std::uint32_t Emitter::emit_chain(std::uint32_t first, std::uint32_t end) {
     Frame::BlockState& start = frame->blocks[first];
     llvm::BasicBlock* after = nullptr;
     const bool is_guarded = first != 0 && !is_cheap(first);
+    const bool was_unguarded = runs_without_lanes;
+    runs_without_lanes = first != 0 && !is_guarded;
     if (is_guarded) {
         llvm::BasicBlock* body = llvm::BasicBlock::Create(context, "block", function_);
         after = llvm::BasicBlock::Create(context, "next", function_);
@@ -215,7 +217,7 @@ std::uint32_t Emitter::emit_chain(std::uint32_t first, std::uint32_t end) {
             builder.CreateStore(builder.getTrue(), frame->blocks[merge].reached);
             builder.CreateStore(chain_mask, frame->blocks[merge].mask);
             next = end;
-        } else if (!block.continue_target && block.terminator.op == Op::OpBranch && next < end &&
+        } else if (!runs_without_lanes && !block.continue_target && block.terminator.op == Op::OpBranch && next < end &&
                    function.find_block(block.terminator.operand(0)) == next &&
                    function.blocks[next].predecessors.size() == 1) {
             at = next;
@@ -225,6 +227,7 @@ std::uint32_t Emitter::emit_chain(std::uint32_t first, std::uint32_t end) {
         break;
     }
     frame->chains.pop_back();
+    runs_without_lanes = was_unguarded;
     if (is_guarded) {
         builder.CreateBr(after);
         builder.SetInsertPoint(after);
@@ -397,7 +400,7 @@ void Emitter::emit_edge(std::uint32_t from, Id to, llvm::Value* condition) {
     llvm::AllocaInst* reached = is_back ? state.back_reached : state.reached;
     llvm::AllocaInst* gathered = is_back ? state.back_mask : state.mask;
     if (!reached) reject("a branch leads back to a block that is no loop header");
-    llvm::Value* taken = !condition                          ? static_cast<llvm::Value*>(builder.getTrue())
+    llvm::Value* taken = !condition                          ? runs_without_lanes ? any(mask) : builder.getTrue()
                          : condition->getType()->isVectorTy() ? any(edge_mask)
                                                              : condition;
     if (block.predecessors.size() == 1) {

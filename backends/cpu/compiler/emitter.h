@@ -290,6 +290,7 @@ class Emitter {
     const Instruction* current = nullptr;
     std::uint64_t chain_count = 0;
     std::uint32_t call_depth = 0;
+    bool runs_without_lanes = false;                   ///< The block is cheap: it runs even where its mask is empty.
 
   private:
     void analyze_frame(Frame& made);
