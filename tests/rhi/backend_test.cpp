@@ -84,8 +84,6 @@ std::span<const Variant> all_variants() {
         Variant{"gl_osmesa", "gl:osmesa", "none", "gl:osmesa"},
         Variant{"gles", "gles", "none", "gles"},
         Variant{"gles_minimum", "gles", "gles31-minimum", "gles, restricted to gles31-minimum"},
-        Variant{"cpu", "cpu:consistent", "none", "cpu:consistent"},
-        Variant{"cpu_fast_8", "cpu:fast:lanes=8:threads=1", "none", "cpu:fast, 8 lanes, 1 thread"},
     };
     return variants;
 }
