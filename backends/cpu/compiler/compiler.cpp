@@ -12,14 +12,12 @@
 #include "backends/cpu/compiler/legalization.h"
 #include "backends/cpu/compiler/module.h"
 #include "backends/cpu/compiler/stages.h"
+#include "compiler_sources_hash.h"
 #include "core/disk_cache.h"
 #include "rhi/spirv.h"
 
 namespace nacre::cpu {
 namespace {
-
-/// Raised whenever the code that is made for the same module changes.
-constexpr std::uint32_t compiler_revision = 1;
 
 class ShaderCompilation final : public Compiler {
   public:
@@ -132,7 +130,7 @@ class ShaderCompilation final : public Compiler {
     }
 
     Hash128 key_of(std::span<const std::uint32_t> words, const ShaderSource& source, spv::ExecutionModel model, const VertexInput& input) const {
-        std::string text = fmt::format("{} {} {} {} {} {} {}\n", compiler_revision, options_.lanes, static_cast<int>(options_.mode),
+        std::string text = fmt::format("{} {} {} {} {} {} {}\n", nacre_cpu_compiler_sources, options_.lanes, static_cast<int>(options_.mode),
                                        static_cast<int>(model), source.entry_point, generator_->fingerprint(), words.size());
         for (const BindingSlots& slot : source.slots) text += fmt::format("s{} {} {} {}\n", slot.set, slot.binding, slot.first, slot.count);
         for (const rhi::VertexAttribute& at : input.attributes)
