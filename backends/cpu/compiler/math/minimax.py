@@ -204,7 +204,8 @@ def main():
     fit("trigonometry", "(sin(r) - r) / r^3 of r^2", *odd(sin), tiny, PI**2 / 16, 2)
     fit("trigonometry", "(cos(r) - 1 + r^2 / 2) / r^4 of r^2", lambda z: (cos(z.sqrt()) - 1 + z / 2) / z**2,
         lambda z: z**2 / cos(z.sqrt()), Decimal("1e-8"), PI**2 / 16, 2)
-    split("trigonometry", "pi", PI, [8, 8, 8])
+    split("trigonometry", "pi", PI, [8, 8, 5])
+    split("trigonometry", "pi, finer", PI, [8, 8, 5, 8])
     fit("inverse_trigonometry", "(asin(s) - s) / s^3 of s^2", *odd(asin), tiny, ONE / 4, 4)
     fit("inverse_trigonometry", "(atan(t) - t) / t^3 of t^2", *odd(atan), tiny, ONE, 8)
     fit("hyperbolics", "(sinh(x) - x) / x^3 of x^2", *odd(sinh), tiny, ONE, 3)
