@@ -43,7 +43,7 @@ struct MathOptions {
 ///     function  error  instructions        function      error  instructions
 ///     sin       2.0      29, 22            exp           1.0      30, 24
 ///     cos       2.3      32, 25            exp2          1.1      26, 21
-///     tan       4        37, 28            log           0.9      44, 35
+///     tan       4.3      37, 28            log           0.9      44, 35
 ///     asin      2.4      22, 18            log2          2.3      38, 30
 ///     acos      1.3      27, 23            pow           below    67, 54
 ///     atan      2.0      27, 19            inverse_sqrt  1.5       3, 3
