@@ -103,9 +103,6 @@ const std::array<FormatPlan, rhi::format_count> plans = [] {
 
 }  // namespace
 
-const FormatPlan& format_plan(Format format) {
-    const auto index = static_cast<std::uint32_t>(format);
-    return plans[index < rhi::format_count ? index : 0];
-}
+const FormatPlan* const format_plans = plans.data();
 
 }  // namespace nacre::cpu

@@ -45,7 +45,13 @@ struct FormatPlan {
     ChannelPlan channels[4];
 };
 
+/// By format; made at start.
+extern const FormatPlan* const format_plans;
+
 /// Never fails; formats that cannot be read have Codec::none.
-const FormatPlan& format_plan(rhi::Format format);
+[[gnu::always_inline]] inline const FormatPlan& format_plan(rhi::Format format) {
+    const auto index = static_cast<std::uint32_t>(format);
+    return format_plans[index < rhi::format_count ? index : 0];
+}
 
 }  // namespace nacre::cpu

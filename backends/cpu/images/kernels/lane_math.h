@@ -127,23 +127,23 @@ NACRE_INLINE Floats<W> log2_lanes(Floats<W> x) {
 template <int W>
 NACRE_INLINE Floats<W> difference_x(Floats<W> v) {
     if constexpr (W == 4) {
-        return __builtin_shuffle(v, Ints<W>{1, 1, 3, 3}) - __builtin_shuffle(v, Ints<W>{0, 0, 2, 2});
+        return __builtin_shufflevector(v, v, 1, 1, 3, 3) - __builtin_shufflevector(v, v, 0, 0, 2, 2);
     } else if constexpr (W == 8) {
-        return __builtin_shuffle(v, Ints<W>{1, 1, 3, 3, 5, 5, 7, 7}) - __builtin_shuffle(v, Ints<W>{0, 0, 2, 2, 4, 4, 6, 6});
+        return __builtin_shufflevector(v, v, 1, 1, 3, 3, 5, 5, 7, 7) - __builtin_shufflevector(v, v, 0, 0, 2, 2, 4, 4, 6, 6);
     } else {
-        return __builtin_shuffle(v, Ints<W>{1, 1, 3, 3, 5, 5, 7, 7, 9, 9, 11, 11, 13, 13, 15, 15}) -
-               __builtin_shuffle(v, Ints<W>{0, 0, 2, 2, 4, 4, 6, 6, 8, 8, 10, 10, 12, 12, 14, 14});
+        return __builtin_shufflevector(v, v, 1, 1, 3, 3, 5, 5, 7, 7, 9, 9, 11, 11, 13, 13, 15, 15) -
+               __builtin_shufflevector(v, v, 0, 0, 2, 2, 4, 4, 6, 6, 8, 8, 10, 10, 12, 12, 14, 14);
     }
 }
 template <int W>
 NACRE_INLINE Floats<W> difference_y(Floats<W> v) {
     if constexpr (W == 4) {
-        return __builtin_shuffle(v, Ints<W>{2, 3, 2, 3}) - __builtin_shuffle(v, Ints<W>{0, 1, 0, 1});
+        return __builtin_shufflevector(v, v, 2, 3, 2, 3) - __builtin_shufflevector(v, v, 0, 1, 0, 1);
     } else if constexpr (W == 8) {
-        return __builtin_shuffle(v, Ints<W>{2, 3, 2, 3, 6, 7, 6, 7}) - __builtin_shuffle(v, Ints<W>{0, 1, 0, 1, 4, 5, 4, 5});
+        return __builtin_shufflevector(v, v, 2, 3, 2, 3, 6, 7, 6, 7) - __builtin_shufflevector(v, v, 0, 1, 0, 1, 4, 5, 4, 5);
     } else {
-        return __builtin_shuffle(v, Ints<W>{2, 3, 2, 3, 6, 7, 6, 7, 10, 11, 10, 11, 14, 15, 14, 15}) -
-               __builtin_shuffle(v, Ints<W>{0, 1, 0, 1, 4, 5, 4, 5, 8, 9, 8, 9, 12, 13, 12, 13});
+        return __builtin_shufflevector(v, v, 2, 3, 2, 3, 6, 7, 6, 7, 10, 11, 10, 11, 14, 15, 14, 15) -
+               __builtin_shufflevector(v, v, 0, 1, 0, 1, 4, 5, 4, 5, 8, 9, 8, 9, 12, 13, 12, 13);
     }
 }
 

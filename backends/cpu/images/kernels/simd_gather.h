@@ -49,6 +49,27 @@ NACRE_INLINE Ints<W> gather_words(const std::byte* base, Ints<W> offset) {
     return words;
 }
 
+/// Texels of 1 or 2 bytes at base + offset[lane], in the low bits; what is above does not matter. Gathers read aligned words, so that
+/// nothing behind the last texel's own word is touched.
+template <int W>
+NACRE_INLINE Ints<W> gather_small_texels(const std::byte* base, Ints<W> offset, int bytes) {
+#ifdef __AVX2__
+    static_cast<void>(bytes);
+    const auto address = reinterpret_cast<std::uintptr_t>(base);
+    const Ints<W> moved = offset + static_cast<std::int32_t>(address & 3);
+    const Ints<W> word = gather_words<W>(reinterpret_cast<const std::byte*>(address & ~std::uintptr_t{3}), moved & ~3);
+    return (Ints<W>)((Uints<W>)word >> (Uints<W>)((moved & 3) << 3));
+#else
+    Ints<W> texels;
+    for (int lane = 0; lane < W; ++lane) {
+        std::uint32_t texel = static_cast<std::uint8_t>(base[offset[lane]]);
+        if (bytes == 2) texel |= static_cast<std::uint32_t>(base[offset[lane] + 1]) << 8;
+        texels[lane] = static_cast<std::int32_t>(texel);
+    }
+    return texels;
+#endif
+}
+
 /// One bit for each lane of a mask.
 template <int W>
 NACRE_INLINE std::uint32_t mask_bits(Ints<W> mask) {

@@ -75,11 +75,7 @@ NACRE_INLINE Place<W> place_texel(const Source& source, Ints<W> x, Ints<W> y, In
 template <int W>
 NACRE_INLINE Ints<W> load_word(const Source& source, Ints<W> offset) {
     if (source.plan->texel_bytes >= 4) return gather_words<W>(source.base, offset);
-    // Aligned words, so that nothing behind the last texel's own word is touched.
-    const auto address = reinterpret_cast<std::uintptr_t>(source.base);
-    const Ints<W> moved = offset + static_cast<std::int32_t>(address & 3);
-    const Ints<W> word = gather_words<W>(reinterpret_cast<const std::byte*>(address & ~std::uintptr_t{3}), moved & ~3);
-    return (Ints<W>)((Uints<W>)word >> (Uints<W>)((moved & 3) << 3));
+    return gather_small_texels<W>(source.base, offset, source.plan->texel_bytes);
 }
 
 template <int W>
@@ -122,20 +118,29 @@ NACRE_INLINE const std::byte* block_address(const Source& source, const Place<W>
 template <int W>
 [[gnu::noinline]] void load_block_words(const Source& source, const Place<W>& place, Ints<W>& words) {
     BlockCache& cache = BlockCache::of_this_thread();
+    const std::byte* last = nullptr;
+    const DecodedBlock* block = nullptr;
     for (int lane = 0; lane < W; ++lane) {
-        const DecodedBlock& block = cache.find(source.format, block_address<W>(source, place, lane));
-        words[lane] = static_cast<std::int32_t>(block.rgba8[(place.y[lane] & 3) * 4 + (place.x[lane] & 3)]);
+        // Neighboring lanes mostly read the same block.
+        const std::byte* const address = block_address<W>(source, place, lane);
+        if (address != last) block = &cache.find(source.format, address, source.plan->texel_bytes);
+        last = address;
+        words[lane] = static_cast<std::int32_t>(block->rgba8[(place.y[lane] & 3) * 4 + (place.x[lane] & 3)]);
     }
 }
 template <int W>
 [[gnu::noinline]] void load_block_channels(const Source& source, const Place<W>& place, Floats<W>* channels) {
     BlockCache& cache = BlockCache::of_this_thread();
     const bool is_half = source.plan->channel_count == 3;
+    const std::byte* last = nullptr;
+    const DecodedBlock* block = nullptr;
     for (int lane = 0; lane < W; ++lane) {
-        const DecodedBlock& block = cache.find(source.format, block_address<W>(source, place, lane));
+        const std::byte* const address = block_address<W>(source, place, lane);
+        if (address != last) block = &cache.find(source.format, address, source.plan->texel_bytes);
+        last = address;
         const int texel = (place.y[lane] & 3) * 4 + (place.x[lane] & 3);
         for (int c = 0; c < source.plan->channel_count; ++c) {
-            channels[c][lane] = is_half ? half_to_float(block.halves[texel][c]) : block.channels[c][texel];
+            channels[c][lane] = is_half ? half_to_float(block->halves[texel][c]) : block->channels[c][texel];
         }
     }
 }

@@ -203,7 +203,7 @@ TEST(BlockFormats, CacheGivesWhatDecodersGive) {
     for (int i = 0; i < 20000; ++i) {
         const auto& block = blocks[random() % blocks.size()];
         const auto format = static_cast<Format>(static_cast<std::uint32_t>(Format::bc1_rgba_unorm) + random() % 14);
-        const DecodedBlock& found = cache.find(format, block.data());
+        const DecodedBlock& found = cache.find(format, block.data(), rhi::info(format).block_bytes);
         const std::uint32_t at = static_cast<std::uint32_t>(random() % 16);
         const Texel texel = decode_texel(format, block.data(), at % 4, at / 4);
         switch (rhi::info(format).channels) {
