@@ -102,10 +102,8 @@ std::vector<Result> Oracle::evaluate(const TestImage& image, const rhi::SamplerD
     must(device_->write_buffer(in, std::span<const DevicePoint>(input)));
     const rhi::Buffer out = must(device_->create_buffer({.size = points.size() * 16, .usage = storage}));
 
-    const rhi::FormatKind kind = rhi::info(shape.format).kind;
     const bool is_integer = rhi::info(shape.format).is_integer();
     const std::string to_bits = !is_integer ? "floatBitsToUint(vec4(" + expression + "))" : "uvec4(" + expression + ")";
-    static_cast<void>(kind);
     const std::string text = R"(
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0) uniform )" + sampler_type(shape.format, shape.dimension, sampler_desc.comparison) + R"( image;

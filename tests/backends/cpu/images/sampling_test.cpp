@@ -165,6 +165,45 @@ TEST_P(Sampling, FiltersAnisotropically) {
     }
 }
 
+// What gather returns are the texels of a linear sample: weighted, they are that sample.
+TEST_P(Sampling, GathersTheTexelsOfLinearSamples) {
+    const Shape& shape = GetParam();
+    using enum ViewDimension;
+    if (shape.dimension == d1 || shape.dimension == d1_array || shape.dimension == d3) return;  // Gather does not exist there.
+    std::size_t inside = 0;
+    for (int i = 0; i < 40; ++i) {
+        rhi::SamplerDesc desc = random_sampler();
+        desc.magnify = desc.minify = rhi::Filter::linear;
+        desc.comparison = i % 2 != 0;
+        const TestImage image({desc.comparison ? Format::d32_float : Format::rgba32_float, shape.dimension, shape.width, shape.height, 1, shape.layers, 1}, random);
+        const SamplerState sampler{desc};
+        const std::uint32_t component = desc.comparison ? 0 : random_below(random, 4);
+        const std::uint32_t offset = is_cube(shape.dimension) || i % 4 < 2 ? 0u : image_offset, compare = desc.comparison ? image_compare : 0u;
+        const std::vector<Point> points = random_quads(100);
+        const auto gathered = run_points(image_function(8), 8, &image.view, &sampler,
+                                         {.flags = flags_of(ImageOperation::gather) | offset | compare | (component << image_component_shift)}, points);
+        const auto sampled = run_points(image_function(8), 8, &image.view, &sampler,
+                                        {.flags = flags_of(ImageOperation::sample) | image_lod_explicit | offset | compare}, points);
+        for (std::size_t p = 0; p < points.size(); ++p) {
+            double u = std::bit_cast<float>(points[p].coordinates[0]), v = std::bit_cast<float>(points[p].coordinates[1]);
+            if (is_cube(shape.dimension)) {
+                // Faces +Z and -Z only: the others are the same but for the names of their axes.
+                const double z = std::bit_cast<float>(points[p].coordinates[2]);
+                if (std::abs(z) <= std::max(std::abs(u), std::abs(v))) continue;
+                u = 0.5 * u / z + 0.5, v = 0.5 * -v / std::abs(z) + 0.5;
+            }
+            ++inside;
+            u = u * shape.width - 0.5, v = v * shape.height - 0.5;
+            const double fx = u - std::floor(u), fy = v - std::floor(v);
+            const double weights[4] = {(1 - fx) * fy, fx * fy, fx * (1 - fy), (1 - fx) * (1 - fy)};
+            double sum = 0.0;
+            for (int tap = 0; tap < 4; ++tap) sum += weights[tap] * std::bit_cast<float>(gathered[p][tap]);
+            ASSERT_NEAR(sum, std::bit_cast<float>(sampled[p][component]), 2e-3) << "sampler " << i << " point " << p;
+        }
+    }
+    EXPECT_GT(inside, 500u);
+}
+
 TEST_P(Sampling, TellsTheLevelOfDetail) {
     for (int i = 0; i < 20 && !HasFatalFailure(); ++i) {
         rhi::SamplerDesc desc = random_sampler();
