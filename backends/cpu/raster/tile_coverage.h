@@ -141,9 +141,9 @@ struct Coverage {
         // The fourth lanes hold something else.
         x = __builtin_shufflevector(x, x, 0, 1, 2, 0) - (run.tile_x * subpixels + subpixels / 2);
         y = __builtin_shufflevector(y, y, 0, 1, 2, 0) - (run.tile_y * subpixels + subpixels / 2);
-        const auto lesser = [](Int4 a, Int4 b) { return a < b ? a : b; };
-        const auto greater = [](Int4 a, Int4 b) { return a > b ? a : b; };
-        const auto turned = [](Int4 a) { return __builtin_shufflevector(a, a, 1, 2, 0, 1); };
+        const auto lesser = [](Int4 one, Int4 other) { return one < other ? one : other; };
+        const auto greater = [](Int4 one, Int4 other) { return one > other ? one : other; };
+        const auto turned = [](Int4 all) { return __builtin_shufflevector(all, all, 1, 2, 0, 1); };
         const Int4 next_x = turned(x), next_y = turned(y);
         const std::int32_t low_x = lesser(lesser(x, next_x), turned(next_x))[0], high_x = greater(greater(x, next_x), turned(next_x))[0];
         const std::int32_t low_y = lesser(lesser(y, next_y), turned(next_y))[0], high_y = greater(greater(y, next_y), turned(next_y))[0];

@@ -302,6 +302,8 @@ struct TileRun {
             block = block && places[quad] == places[0] + 4 * quad;
         alignas(64) std::uint32_t keep[16];
         store(keep, select(lanes_of(live), ints(0), ints(-1)));
+        std::size_t offsets[4] = {};
+        std::uint32_t row_stride = 0, texel_bytes = 0;
         for (std::uint32_t i = 0; i < draw->color_count; ++i) {
             const ColorPlan& plan = draw->colors[i];
             const ColorTarget& target = targets.colors[plan.target];
@@ -311,10 +313,15 @@ struct TileRun {
                 pack_colors(plan, target, *job.srgb, batch, packed);
                 words = packed;
             }
+            // Most targets of a pass have rows of the same size.
+            if (target.row_stride != row_stride || target.texel_bytes != texel_bytes) {
+                row_stride = target.row_stride, texel_bytes = target.texel_bytes;
+                for (std::uint32_t quad = 0; quad < 4; ++quad)
+                    offsets[quad] = static_cast<std::size_t>(batch.y[quad]) * row_stride +
+                                    static_cast<std::size_t>(batch.x[quad]) * texel_bytes;
+            }
             QuadRows rows;
-            for (std::uint32_t quad = 0; quad < quads; ++quad)
-                rows.top[quad] = target.data + static_cast<std::size_t>(batch.y[quad]) * target.row_stride +
-                                 static_cast<std::size_t>(batch.x[quad]) * target.texel_bytes;
+            for (std::uint32_t quad = 0; quad < 4; ++quad) rows.top[quad] = target.data + offsets[quad];
             if (target.texel_bytes == 4 && inside) {
                 if (block)
                     store_block_words(rows.top[0], target.row_stride, words[0]);
