@@ -42,6 +42,7 @@ struct TileRun {
     const std::byte* vertex_memory = nullptr;
     const PrimitiveData* primitive = nullptr;
     std::uint32_t next_slot = 0;
+    std::uint32_t entered_regions = 0, fetched_regions = 0;  ///< One bit for each region: see enter_region.
     bool front = true;
 
     // Hierarchical depth: bounds of the depths of each region, and how many blocks were written since they were exact.
@@ -213,6 +214,28 @@ struct TileRun {
         return *primitive;
     }
 
+    /// Asks for the lines of the color targets in a region that is drawn to for the first time, and in the one behind it, which
+    /// is likely to follow: stores would wait for them one after another otherwise.
+    [[gnu::noinline]] void enter_region(std::uint32_t region) {
+        entered_regions |= 1u << region;
+        if (targets.samples > 1) return;
+        for (std::uint32_t next = region; next < region + 2 && next < regions_across * regions_across; ++next) {
+            if (fetched_regions >> next & 1) continue;
+            fetched_regions |= 1u << next;
+            const std::int32_t x = static_cast<std::int32_t>(next % regions_across) * 16;
+            const std::int32_t y = static_cast<std::int32_t>(next / regions_across) * 16;
+            if (x >= width) continue;
+            const std::int32_t rows = height - y < 16 ? height - y : 16;
+            for (std::uint32_t i = 0; i < draw->color_count; ++i) {
+                const ColorTarget& target = targets.colors[draw->colors[i].target];
+                const std::byte* line = target.data + static_cast<std::size_t>(tile_y + y) * target.row_stride +
+                                        static_cast<std::size_t>(tile_x + x) * target.texel_bytes;
+                for (std::int32_t row = 0; row < rows; ++row, line += target.row_stride)
+                    for (std::uint32_t byte = 0; byte < 16 * target.texel_bytes; byte += 64) __builtin_prefetch(line + byte, 1);
+            }
+        }
+    }
+
     /// The quads of a block of 4x4 pixels.
     /// @param live     pixels, 16 bits
     /// @param covered  for each pixel the samples that the primitive covers; null with one sample
@@ -221,6 +244,8 @@ struct TileRun {
                                              std::uint32_t live, const std::uint8_t* covered, const std::uint8_t* alive) {
         Stream& stream = memory.streams[stream_index];
         if (stream.quads + 4 > stream_quads) flush_stream(stream_index);
+        const std::uint32_t region = (place >> 10) * regions_across + (place >> 6 & 3);
+        if ((entered_regions >> region & 1) == 0) enter_region(region);
         const PrimitiveData* const from = &current_primitive();
         std::uint32_t next = stream.quads;
         for (std::uint32_t quad = 0; quad < 4; ++quad) {
