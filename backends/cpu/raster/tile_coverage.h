@@ -106,8 +106,57 @@ struct Coverage {
         return mask_of(not_negative(inside));
     }
 
+    /// The frequent case: one sample, depth tested before the fragment function or not at all, no stencil.
+    template <int edge_count>
+    void run_simple_blocks(std::int32_t first_x, std::int32_t last_x, std::int32_t first_y, std::int32_t last_y) {
+        const Record& record = *run.record;
+        const DrawPlan& draw = *run.draw;
+        const rhi::CompareOperation operation = draw.depth_stencil.compare;
+        const bool shades = draw.shades, tests = run.depth != nullptr, writes = draw.depth_stencil.depth_write;
+        const Floats plane_c = floats(record.depth_c), plane_dx = floats(record.depth_dx), from_x = floats(record.x0);
+        const Floats center_x = to_floats(load(lane_x)) + floats(static_cast<float>(run.tile_x) + 0.5f);
+        const Floats center_y = to_floats(load(lane_y)) + floats(static_cast<float>(run.tile_y) + 0.5f);
+        std::uint32_t passed = 0;
+        for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y) {
+            // As in TileRun::depth_at; what is the same in a row of blocks is computed once.
+            const Floats along_y = floats(record.depth_dy) *
+                                   (center_y + floats(static_cast<float>(4 * block_y)) - floats(record.y0));
+            for (std::int32_t block_x = first_x; block_x <= last_x; ++block_x) {
+                std::uint32_t mask = bounded ? lanes_inside(block_x, block_y, x0, x1, y0, y1) : 0xffff;
+                if constexpr (edge_count > 0) mask &= covered<edge_count>(block_x, block_y, 0);
+                if (mask == 0) continue;
+                const std::uint32_t place = block_place(block_x, block_y);
+                if (tests) {
+                    const Floats x = center_x + floats(static_cast<float>(4 * block_x));
+                    const Ints key = depth_key(run.targets.depth_layout, plane_c + plane_dx * (x - from_x) + along_y,
+                                               run.depth_low, run.depth_high);
+                    std::int32_t* const depth = run.memory.depth[0] + place;
+                    const Ints old = load(depth);
+                    mask &= mask_of(operation == rhi::CompareOperation::less            ? less(key, old)
+                                    : operation == rhi::CompareOperation::less_or_equal ? ~less(old, key)
+                                                                                        : compare(operation, key, old));
+                    if (mask == 0) continue;
+                    if (writes) {
+                        store(depth, select(lanes_of(mask), key, old));
+                        run.depth_written(place);
+                    }
+                }
+                passed += static_cast<std::uint32_t>(__builtin_popcount(mask));
+                if (shades)
+                    run.append_block(0, run.tile_x + 4 * block_x, run.tile_y + 4 * block_y, place, mask, nullptr, nullptr);
+            }
+        }
+        run.memory.passed_samples += passed;
+    }
+
     template <int edge_count>
     void run_blocks(std::int32_t first_x, std::int32_t last_x, std::int32_t first_y, std::int32_t last_y) {
+        if constexpr (!multisampled) {
+            if (run.simple_depth) {
+                run_simple_blocks<edge_count>(first_x, last_x, first_y, last_y);
+                return;
+            }
+        }
         for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y)
             for (std::int32_t block_x = first_x; block_x <= last_x; ++block_x) {
                 const std::uint32_t limit = bounded ? lanes_inside(block_x, block_y, x0, x1, y0, y1) : 0xffff;
@@ -211,35 +260,8 @@ struct Coverage {
             }
     }
 
-    /// The frequent case: one sample, depth tested before the fragment function or not at all, no stencil.
-    void shade_simple_block(std::int32_t block_x, std::int32_t block_y, std::uint32_t mask) {
-        const std::uint32_t place = block_place(block_x, block_y);
-        const std::int32_t x = run.tile_x + 4 * block_x, y = run.tile_y + 4 * block_y;
-        if (run.depth) {
-            const DepthStencilPlan& plan = run.draw->depth_stencil;
-            const Ints key = run.key_at(floats(static_cast<float>(x) + 0.5f) + to_floats(load(lane_x)),
-                                        floats(static_cast<float>(y) + 0.5f) + to_floats(load(lane_y)));
-            std::int32_t* const depth = run.memory.depth[0] + place;
-            const Ints old = load(depth);
-            mask &= mask_of(compare(plan.compare, key, old));
-            if (mask == 0) return;
-            if (plan.depth_write) {
-                store(depth, select(lanes_of(mask), key, old));
-                run.depth_written(block_x, block_y);
-            }
-        }
-        run.memory.passed_samples += static_cast<std::uint32_t>(__builtin_popcount(mask));
-        if (run.draw->shades) run.append_block(0, x, y, place, mask, nullptr, nullptr);
-    }
-
     /// @param masks  for each sample the pixels of the block that it covers
     void shade_block(std::int32_t block_x, std::int32_t block_y, std::uint32_t (&masks)[samples]) {
-        if constexpr (!multisampled) {
-            if (run.simple_depth) {
-                shade_simple_block(block_x, block_y, masks[0]);
-                return;
-            }
-        }
         const DrawPlan& draw = *run.draw;
         const std::uint32_t place = block_place(block_x, block_y);
         const std::int32_t x = run.tile_x + 4 * block_x, y = run.tile_y + 4 * block_y;
@@ -260,7 +282,7 @@ struct Coverage {
                 if (tests) {
                     alive[s] = test_lanes(draw.depth_stencil, run.front, key, masks[s], depth,
                                           run.stencil ? run.memory.stencil[s] + place : nullptr);
-                    if (alive[s] && draw.depth_stencil.depth_write && run.depth) run.depth_written(block_x, block_y);
+                    if (alive[s] && draw.depth_stencil.depth_write && run.depth) run.depth_written(place);
                 } else {
                     alive[s] &= mask_of(compare(draw.depth_stencil.compare, key, load(depth)));
                 }

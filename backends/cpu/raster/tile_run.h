@@ -35,7 +35,8 @@ struct TileRun {
     std::int32_t* depth = nullptr;    ///< Where the draw tests depth.
     std::int32_t* stencil = nullptr;
     float depth_low = 0.0f, depth_high = 1.0f;
-    bool simple_depth = false;        ///< See Coverage::shade_simple_block.
+    bool simple_depth = false;        ///< See Coverage::run_simple_blocks.
+    bool lowers_depth = false, raises_depth = false;  ///< What the draw writes may leave the bounds of a region there.
 
     // The record that is drawn.
     const Record* record = nullptr;
@@ -123,6 +124,7 @@ struct TileRun {
             stencil = memory.stencil[0];
             stencil_changed = true;
         }
+        lowers_depth = !keeps_farther(plan.compare), raises_depth = !keeps_nearer(plan.compare);
         simple_depth = targets.samples == 1 && !draw->late_tests && !stencil;
         depth_low = plan.clamps ? plan.clamp_low : 0.0f;
         depth_high = plan.clamps ? plan.clamp_high : 1.0f;
@@ -142,12 +144,12 @@ struct TileRun {
         return depth_key(targets.depth_layout, depth_at(x, y), depth_low, depth_high);
     }
 
-    void depth_written(std::int32_t block_x, std::int32_t block_y) {
-        const std::int32_t region = block_y / region_blocks * regions_across + block_x / region_blocks;
-        const rhi::CompareOperation operation = draw->depth_stencil.compare;
+    /// @param place  of a block, or of a quad in it
+    void depth_written(std::uint32_t place) {
+        const std::uint32_t region = (place >> 10) * regions_across + (place >> 6 & 3);
         ++region_writes[region];
-        if (!keeps_farther(operation)) region_low[region] = key_lowest;
-        if (!keeps_nearer(operation)) region_high[region] = key_highest;
+        if (lowers_depth) region_low[region] = key_lowest;
+        if (raises_depth) region_high[region] = key_highest;
     }
 
     void measure_region(std::int32_t region_x, std::int32_t region_y) {
@@ -432,8 +434,7 @@ struct TileRun {
             for (std::uint32_t quad = first; quad < end && quad < max_quads; ++quad) {
                 if (depth && draw->depth_stencil.depth_write && (passed >> (4 * quad) & 15) != 0) {
                     std::memcpy(memory.depth[sample] + places[quad], depths + 4 * quad, 16);
-                    const auto block = static_cast<std::int32_t>(places[quad] / 16);
-                    depth_written(block % tile_blocks, block / tile_blocks);
+                    depth_written(places[quad]);
                 }
                 if (stencil) std::memcpy(memory.stencil[sample] + places[quad], stencils + 4 * quad, 16);
             }
