@@ -178,6 +178,7 @@ TEST(Stability, EmptyThingsAreNothing) {
     cpu::RenderTargets none;
     TestScheduler scheduler(2);
     cpu::Rasterizer rasterizer(scheduler, 16);
+    bench.state.pipeline = &bench.pipeline;
     rasterizer.begin_pass(none);
     rasterizer.draw(bench.state, {.count = 3});
     rasterizer.end_pass();
