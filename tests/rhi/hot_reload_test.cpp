@@ -142,8 +142,7 @@ TEST_P(HotReload, WhatTheProgramBindsAndPushesMustGoOnFitting) {
     const auto fill =
         ok(pipelines.add(ComputePipelineDesc{.bind_group_layouts = {words_layout}, .name = "fill"}, {.path = "fill.comp"}));
     const Buffer words = buffer(4, BufferUsage::storage);
-    const Buffer numbers = buffer(16, BufferUsage::uniform);
-    ok(device().write_buffer(numbers, std::as_bytes(std::span(std::array<std::uint32_t, 4>{40, 50, 0, 0}))));
+    const Buffer numbers = buffer_of<std::uint32_t>(std::array<std::uint32_t, 4>{40, 50, 0, 0}, BufferUsage::uniform);
     const BindGroup words_group =
         ok(device().create_bind_group({.layout = words_layout, .entries = {{.binding = 0, .buffer = words}}}));
     const BindGroup number_group = ok(device().create_bind_group(
@@ -153,8 +152,7 @@ TEST_P(HotReload, WhatTheProgramBindsAndPushesMustGoOnFitting) {
         list.set_pipeline(pipelines.get(fill));
         list.set_bind_group(0, words_group);
         list.set_bind_group(1, number_group);
-        const std::uint32_t pushed = 2;
-        list.push_constants(std::as_bytes(std::span(&pushed, 1)));
+        list.set_push_constants(std::uint32_t{2});
         list.dispatch({});
         run(std::move(list));
         return read<std::uint32_t>(words)[0];
