@@ -70,6 +70,14 @@ const std::vector<RenderVariant>& render_variants() {
     return available;
 }
 
+Expected<std::unique_ptr<rhi::Device>> make_failing_device(const RenderVariant& variant,
+                                                           const rhi::FaultInjection& faults) {
+    return instance().create_device({.backend = variant.backend,
+                                     .restriction = variant.restriction,
+                                     .faults = faults,
+                                     .name = variant.name + " that fails"});
+}
+
 void release_devices() { made_devices().clear(); }
 
 std::vector<std::string> messages_of(const RenderVariant& variant) {
