@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <functional>
@@ -125,6 +126,30 @@ TEST_F(RenderCommandTest, WatchedShadersChangeThePicture) {
         nacre({"render", "builtin:triangle", "-o", picture, "--watch", (sources.path() / "missing").string()});
     EXPECT_EQ(missing.exit_code, 1);
     EXPECT_THAT(missing.errors, HasSubstr("there is no such folder"));
+}
+
+// Drivers are found by the process that looks for them, so each absence takes a process of its own.
+TEST_F(RenderCommandTest, MissingDriversAreNamedAndTheOthersGoOn) {
+    const auto has = [](const std::string& name) { return std::ranges::find(backends(), name) != backends().end(); };
+    const auto devices_without = [](std::vector<std::string> variables) {
+        variables.insert(variables.end(), environment().begin(), environment().end());
+        const CommandResult result = run_nacre({"devices"}, variables);
+        EXPECT_EQ(result.exit_code, 0) << result.errors;
+        return result.output;
+    };
+    if (has("vulkan") && backends().size() > 1) {
+        const std::string found = devices_without({"VK_ICD_FILENAMES=/nonexistent", "VK_DRIVER_FILES=/nonexistent"});
+        EXPECT_THAT(found, AllOf(HasSubstr("vulkan cannot be used: "), HasSubstr("mesa-vulkan-drivers")));
+        for (const std::string& name : backends()) {
+            if (name != "vulkan") {
+                EXPECT_THAT(found, HasSubstr("\n" + name + " "));
+            }
+        }
+    }
+    if (has("gles") && has("vulkan")) {
+        const std::string found = devices_without({"__EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent"});
+        EXPECT_THAT(found, AllOf(HasSubstr("gles cannot be used: "), HasSubstr("libegl-mesa0"), HasSubstr("\nvulkan ")));
+    }
 }
 
 TEST_F(RenderCommandTest, PictureAndJsonOnEveryBackend) {
