@@ -122,8 +122,8 @@ std::string FrameGraph::to_svg() const {
     for (std::size_t row = 0; row < rows.size(); ++row) {
         const Pass& pass = passes_[rows[row]];
         const int y = row_y(static_cast<std::uint32_t>(row));
-        fmt::format_to(out, "<line x1=\"{}\" y1=\"{}\" x2=\"{}\" y2=\"{}\" stroke=\"#e4e4e4\"/>\n", left - 8, y,
-                       right, y);
+        fmt::format_to(out, "<line x1=\"{}\" y1=\"{}\" x2=\"{}\" y2=\"{}\" stroke=\"#e4e4e4\"/>\n", left - 8, y, right,
+                       y);
         fmt::format_to(out, "<rect x=\"12\" y=\"{}\" width=\"{}\" height=\"24\" rx=\"5\" fill=\"{}\" stroke=\"{}\"/>\n",
                        y - 12, left - 24, pass.is_live ? "#ffe3b8" : "#f3f3f3", pass.is_live ? "#c98a2b" : "#bbbbbb");
         fmt::format_to(out, "<text x=\"22\" y=\"{}\" fill=\"{}\">{}{}</text>\n", y + 4,
@@ -141,11 +141,12 @@ std::string FrameGraph::to_svg() const {
     };
     std::vector<int> labels_drawn(static_cast<std::size_t>(columns));
     const auto draw_label = [&](std::string_view name, int column, const char* color) {
-        fmt::format_to(out, "<g transform=\"translate({},{}) rotate(-60)\">", column_x(column) + 4 + labels_drawn[column]++ * label_width,
-                       top - 10);
+        fmt::format_to(out, "<g transform=\"translate({},{}) rotate(-60)\">",
+                       column_x(column) + 4 + labels_drawn[column]++ * label_width, top - 10);
         // Which of several names belongs to which bar.
         const bool has_mark = labels_in_column[column] > 1;
-        if (has_mark) fmt::format_to(out, "<rect y=\"-8\" width=\"8\" height=\"8\" fill=\"{}\" fill-opacity=\"0.6\"/>", color);
+        if (has_mark)
+            fmt::format_to(out, "<rect y=\"-8\" width=\"8\" height=\"8\" fill=\"{}\" fill-opacity=\"0.6\"/>", color);
         fmt::format_to(out, "<text x=\"{}\" fill=\"#333333\">{}</text></g>\n", has_mark ? 12 : 0, escaped(name));
     };
     for (std::uint32_t i = 0; i < textures_.size(); ++i) {
@@ -153,7 +154,8 @@ std::string FrameGraph::to_svg() const {
         if (!node.is_drawn()) continue;
         const int column = texture_column[i];
         const char* color = colors[i % std::size(colors)];
-        draw_life(node.desc.name, column, node.first_pass, node.last_pass, node.imported, node.kept || node.imported, color,
+        draw_life(node.desc.name, column, node.first_pass, node.last_pass, node.imported, node.kept || node.imported,
+                  color,
                   fmt::format("{} {}x{}, {}{}", rhi::info(node.desc.format).name, node.desc.width, node.desc.height,
                               size_text(node.bytes), node.imported ? ", persistent" : ""));
         draw_label(node.desc.name, column, color);
@@ -175,14 +177,15 @@ std::string FrameGraph::to_svg() const {
                            row_y(row_of[i]), writes ? "#c03020" : "#ffffff", writes ? "#c03020" : "#2060a0");
         }
     }
-    fmt::format_to(out,
-                   "<text x=\"12\" y=\"22\" font-size=\"15\">Frame graph</text>\n"
-                   "<text x=\"12\" y=\"42\" fill=\"#555555\">transient: {} ({} without sharing)</text>\n"
-                   "<circle cx=\"18\" cy=\"{}\" r=\"5\" fill=\"#c03020\"/><text x=\"28\" y=\"{}\">writes</text>\n"
-                   "<circle cx=\"88\" cy=\"{}\" r=\"5\" fill=\"#ffffff\" stroke=\"#2060a0\" stroke-width=\"2\"/>"
-                   "<text x=\"98\" y=\"{}\">reads; one column is one piece of memory, one bar what it holds</text>\n</svg>\n",
-                   size_text(transient_bytes()), size_text(transient_bytes_unshared()), height - 24, height - 20,
-                   height - 24, height - 20);
+    fmt::format_to(
+        out,
+        "<text x=\"12\" y=\"22\" font-size=\"15\">Frame graph</text>\n"
+        "<text x=\"12\" y=\"42\" fill=\"#555555\">transient: {} ({} without sharing)</text>\n"
+        "<circle cx=\"18\" cy=\"{}\" r=\"5\" fill=\"#c03020\"/><text x=\"28\" y=\"{}\">writes</text>\n"
+        "<circle cx=\"88\" cy=\"{}\" r=\"5\" fill=\"#ffffff\" stroke=\"#2060a0\" stroke-width=\"2\"/>"
+        "<text x=\"98\" y=\"{}\">reads; one column is one piece of memory, one bar what it holds</text>\n</svg>\n",
+        size_text(transient_bytes()), size_text(transient_bytes_unshared()), height - 24, height - 20, height - 24,
+        height - 20);
     return text;
 }
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "passes/render_pass.h"
 
-#include <algorithm>
 #include <fmt/format.h>
+
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <tuple>
@@ -198,8 +199,7 @@ Expected<void> ComputeStep::prepare(RenderContext& context, const std::string& p
     shaders = &context.shaders;
     NACRE_TRY(pipeline, context.shaders.compute_pipeline(
                             pass, {.bind_group_layouts = std::move(layouts), .name = source.path}, source));
-    NACRE_TRY(const rhi::BindGroupLayout layout,
-              context.device.bind_group_layout(context.shaders.get(pipeline), set));
+    NACRE_TRY(const rhi::BindGroupLayout layout, context.device.bind_group_layout(context.shaders.get(pipeline), set));
     group_index = set;
     NACRE_TRY(group, context.device.create_bind_group({.layout = layout, .entries = std::move(entries), .name = pass}));
     return {};

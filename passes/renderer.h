@@ -111,9 +111,9 @@ struct FinalPicture {
 
 class Renderer {
   public:
-    /// Uploads the scene, compiles shaders, prepares the environment's tables. Errors: not_found (profile, camera, shader
-    /// folder), unsupported (the device cannot hold the profile; the text names the limit), out_of_memory, shader_compile,
-    /// device_lost.
+    /// Uploads the scene, compiles shaders, prepares the environment's tables. Errors: not_found (profile, camera,
+    /// shader folder), unsupported (the device cannot hold the profile; the text names the limit), out_of_memory,
+    /// shader_compile, device_lost.
     static Expected<std::unique_ptr<Renderer>> create(rhi::Device& device, const scene::Scene& scene,
                                                       const RenderOptions& options = {});
     ~Renderer();
@@ -122,10 +122,11 @@ class Renderer {
 
     /// Renders one frame and waits for it.
     Expected<FrameStatistics> render_frame();
-    /// Looks for changes of the shaders' files ("hot reload"; call it between frames) and makes the pipelines anew that they
-    /// concern, from the next frame on. One entry for each pass and outcome, none where nothing changed. A shader that does
-    /// not compile is reported once, with file and line, and leaves the old pipeline in use. Shaders that prepare the
-    /// environment have run by then: that a change does not show is reported as unsupported. The plan stays that of `create`.
+    /// Looks for changes of the shaders' files ("hot reload"; call it between frames) and makes the pipelines anew that
+    /// they concern, from the next frame on. One entry for each pass and outcome, none where nothing changed. A shader
+    /// that does not compile is reported once, with file and line, and leaves the old pipeline in use. Shaders that
+    /// prepare the environment have run by then: that a change does not show is reported as unsupported. The plan stays
+    /// that of `create`.
     std::vector<rhi::PipelineReload> reload_shaders();
     /// Sees the scene from elsewhere, from the next frame on.
     void set_camera(const scene::Camera& camera);

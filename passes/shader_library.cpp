@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "passes/shader_library.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
-#include <fmt/format.h>
 
 #include "core/hash.h"
 #include "passes/gbuffer_layout.h"
@@ -29,7 +30,8 @@ std::string key_of(const rhi::ShaderSource& source) {
 
 ShaderLibrary::ShaderLibrary(rhi::Device& device, DiskCache* cache, std::filesystem::path folder)
     : device_(device),
-      compiler_({.embedded = {embedded_files(), generated_files()}, .source_folder = std::move(folder), .cache = cache}),
+      compiler_(
+          {.embedded = {embedded_files(), generated_files()}, .source_folder = std::move(folder), .cache = cache}),
       pipelines_(device, compiler_) {}
 
 ShaderLibrary::~ShaderLibrary() {
@@ -95,10 +97,11 @@ std::vector<rhi::PipelineReload> ShaderLibrary::reload_changed() {
         if (!compiler_.is_outdated(once.source)) continue;
         // Compiled for what it says, and so that the change is reported only once.
         const auto result = compiler_.compile(once.source);
-        all.push_back({once.pass, result ? Error{ErrorCode::unsupported, "reload shader", fmt::format("'{}'", once.source.path),
-                                                 "it runs once, before the first frame, so its change does not show",
-                                                 "Start the program again."}
-                                         : result.error()});
+        all.push_back(
+            {once.pass, result ? Error{ErrorCode::unsupported, "reload shader", fmt::format("'{}'", once.source.path),
+                                       "it runs once, before the first frame, so its change does not show",
+                                       "Start the program again."}
+                               : result.error()});
     }
     // A pass has many pipelines of the same files; what is wrong with one is wrong with all.
     std::vector<rhi::PipelineReload> reloads;

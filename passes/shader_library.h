@@ -34,8 +34,8 @@ class ShaderLibrary {
     /// Error not_found: `folder` is none, or holds none of the files that shaders are made of.
     static Expected<void> check_folder(const std::filesystem::path& folder);
 
-    /// Pipelines that live as long as the library. The shaders of `desc` are left empty; what they are is noted under the
-    /// pass's name for the plan.
+    /// Pipelines that live as long as the library. The shaders of `desc` are left empty; what they are is noted under
+    /// the pass's name for the plan.
     Expected<rhi::ReloadableGraphicsPipeline> graphics_pipeline(const std::string& pass,
                                                                 const rhi::GraphicsPipelineDesc& desc,
                                                                 const rhi::ShaderSource& vertex,

@@ -102,8 +102,10 @@ struct PipelineReloader::State {
         }
         const std::uint32_t old_bytes = push_constant_bytes(before.shaders), new_bytes = push_constant_bytes(shaders);
         if (old_bytes != new_bytes)
-            return unfit(fmt::format("its push constants have grown or shrunk from {} to {} bytes, which is not what the "
-                                     "program pushes", old_bytes, new_bytes));
+            return unfit(
+                fmt::format("its push constants have grown or shrunk from {} to {} bytes, which is not what the "
+                            "program pushes",
+                            old_bytes, new_bytes));
         return {};
     }
 

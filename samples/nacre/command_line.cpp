@@ -309,9 +309,10 @@ struct Definition {
         add_picture(*command, render.scene);
         add_output_options(*command, render.scene, "Also write this texture that passes hand on, beside the picture");
         add_dump_graph(*command, render.scene);
-        command->add_option("--watch", render.scene.watch,
-                            "Take the shaders from this source folder; render again whenever one of them changes, until "
-                            "Ctrl-C")
+        command
+            ->add_option("--watch", render.scene.watch,
+                         "Take the shaders from this source folder; render again whenever one of them changes, until "
+                         "Ctrl-C")
             ->type_name("FOLDER")
             ->group("Output");
         add_json(*command, render.scene.json);

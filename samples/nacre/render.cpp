@@ -117,9 +117,10 @@ Expected<void> render_and_write(const SceneSession& scene, const RenderSession& 
     NACRE_CHECK(write_graph(renderer, arguments.scene.dump_graph));
     print_result(arguments.scene.json, text);
     const double luminance = measure::median_luminance(picture.exposed);
-    return write_json(arguments.scene.json, json_of(session, arguments, times, luminance, warnings)
-                                                    .dump(2, ' ', false, Json::error_handler_t::replace) +
-                                                "\n");
+    return write_json(
+        arguments.scene.json,
+        json_of(session, arguments, times, luminance, warnings).dump(2, ' ', false, Json::error_handler_t::replace) +
+            "\n");
 }
 
 }  // namespace

@@ -11,9 +11,9 @@
 
 namespace nacre::command {
 
-/// Until Ctrl-C (or SIGTERM): looks for changed shaders ten times a second, tells on standard error what became of each, and
-/// calls `render` where a pipeline is new. A shader that does not compile leaves the picture as it is. Error: that of
-/// `render`, which ends it.
+/// Until Ctrl-C (or SIGTERM): looks for changed shaders ten times a second, tells on standard error what became of
+/// each, and calls `render` where a pipeline is new. A shader that does not compile leaves the picture as it is. Error:
+/// that of `render`, which ends it.
 Expected<void> watch_shaders(passes::Renderer& renderer, const std::string& folder,
                              const std::function<Expected<void>()>& render);
 

@@ -15,7 +15,8 @@ RENDERER_SUITE(RendererFaults);
 scene::Scene small_scene() {
     scene::Scene scene = empty_scene();
     scene.environment = uniform_environment(glm::vec3(0.5f));
-    place(scene, scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), add_material(scene, lambert(glm::vec3(0.5f))));
+    place(scene, scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}),
+          add_material(scene, lambert(glm::vec3(0.5f))));
     scene.lights.push_back(directional_light({0, -1, -1}, 1.0f));
     return scene;
 }
@@ -100,7 +101,8 @@ TEST_P(RendererFaults, WhereNothingCanBeSeenTheEnvironmentIs) {
     expect_environment(scene, "a mesh without vertices");
     place(scene, scene::parallelogram({-1, -1, -1}, {2, 0, 0}, {0, 2, 0}), material, glm::mat4(0.0f));
     expect_environment(scene, "a transform that leaves nothing");
-    scene.cameras.push_back({.name = "broken", .vertical_field_of_view = 0.0f, .near_distance = -1.0f, .far_distance = 0.0f});
+    scene.cameras.push_back(
+        {.name = "broken", .vertical_field_of_view = 0.0f, .near_distance = -1.0f, .far_distance = 0.0f});
     expect_environment(scene, "a camera whose numbers make no sense");
 }
 

@@ -41,7 +41,8 @@ class SourceFolder {
         }
         text->replace(at, before.size(), after);
         write(file, *text);
-        return 1 + static_cast<std::size_t>(std::count(text->begin(), text->begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+        return 1 + static_cast<std::size_t>(
+                       std::count(text->begin(), text->begin() + static_cast<std::ptrdiff_t>(at), '\n'));
     }
 
   private:

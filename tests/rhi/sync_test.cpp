@@ -371,7 +371,8 @@ TEST_P(Faults, StrangeTrianglesStayInsideTheTarget) {
     const auto draw = [&](GraphicsPipeline with, const Corners& corners) {
         CommandList list = device().create_command_list("strange");
         for (std::uint32_t index : {0u, 1u, 2u}) {
-            list.begin_render_pass({.color = {{.view = TextureView::subresource(picture, 0, index), .load = LoadOperation::clear}}});
+            list.begin_render_pass(
+                {.color = {{.view = TextureView::subresource(picture, 0, index), .load = LoadOperation::clear}}});
             if (index == 1) {
                 list.set_pipeline(with);
                 list.set_push_constants(corners);

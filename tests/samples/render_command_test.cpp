@@ -83,7 +83,8 @@ TEST_F(RenderCommandTest, DevicesAreListed) {
 
 TEST_F(RenderCommandTest, WatchedShadersChangeThePicture) {
     const auto wait_for = [](const std::function<bool()>& is_so) {
-        for (int tries = 0; tries < 600 && !is_so(); ++tries) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        for (int tries = 0; tries < 600 && !is_so(); ++tries)
+            std::this_thread::sleep_for(std::chrono::milliseconds(100));
         return is_so();
     };
     const std::filesystem::path shader = "passes/tonemap/tonemap.comp";
@@ -112,7 +113,8 @@ TEST_F(RenderCommandTest, WatchedShadersChangeThePicture) {
     }
 
     write("imageStore(", "image_store(");
-    ASSERT_TRUE(wait_for([&] { return program.errors().find("image_store") != std::string::npos; })) << program.errors();
+    ASSERT_TRUE(wait_for([&] { return program.errors().find("image_store") != std::string::npos; }))
+        << program.errors();
     EXPECT_THAT(program.errors(), HasSubstr("passes/tonemap/tonemap.comp:"));
     EXPECT_EQ((*read_image_bytes(picture)).bytes, green.bytes) << "a shader that does not compile changes nothing";
 
@@ -148,7 +150,8 @@ TEST_F(RenderCommandTest, MissingDriversAreNamedAndTheOthersGoOn) {
     }
     if (has("gles") && has("vulkan")) {
         const std::string found = devices_without({"__EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent"});
-        EXPECT_THAT(found, AllOf(HasSubstr("gles cannot be used: "), HasSubstr("libegl-mesa0"), HasSubstr("\nvulkan ")));
+        EXPECT_THAT(found,
+                    AllOf(HasSubstr("gles cannot be used: "), HasSubstr("libegl-mesa0"), HasSubstr("\nvulkan ")));
     }
 }
 
