@@ -239,7 +239,7 @@ TEST_F(RenderCommandTest, BackendsThatAreWrongAreNamed) {
     EXPECT_EQ(wrong("direct3d").exit_code, 2);
     EXPECT_THAT(wrong("direct3d").errors, AllOf(HasSubstr("'direct3d'"), HasSubstr("vulkan")));
     for (const std::string& backend : backends()) {
-        for (const char* options : {":lanes=0x", ":threads=many", ":fastest", ":lanes=8", ":"}) {
+        for (const char* options : {":lanes=0x", ":threads=many", ":fastest", ":lanes=7", ":"}) {
             const CommandResult result = wrong(backend + options);
             EXPECT_EQ(result.exit_code, 2) << backend << options << ": " << result.errors;
         }
