@@ -66,7 +66,7 @@ void say(int to, const std::string& text) {
         const std::string base = fmt::format("{}/{}", settings.folder, seed);
         std::ofstream(base + ".glsl") << shader.text;
         std::ofstream(base + ".txt") << fmt::format("seed {}\n{} and {}\n{}\n", seed, found->first, found->second, found->what);
-        say(to, fmt::format("differs {} and {}: {}", found->first, found->second, found->what.substr(0, 300)));
+        say(to, fmt::format("differs {} and {}: {}", found->first, found->second, found->what.substr(0, found->what.find('\n', 120))));
         if (settings.reduces && found->what.find("shader_compile") == std::string::npos)
             std::ofstream(base + ".reduced.glsl") << comparison.reduce(shader, *found);
     }
@@ -205,10 +205,10 @@ int main(int argc, char** argv) {
             const std::string head = std::string("--") + name + "=";
             return text.starts_with(head) ? std::optional(text.substr(head.size())) : std::nullopt;
         };
-        if (const auto v = value("seed")) settings.seed = std::strtoull(v->c_str(), nullptr, 10);
-        else if (const auto v = value("count")) settings.count = std::strtoull(v->c_str(), nullptr, 10);
-        else if (const auto v = value("workers")) settings.workers = std::max(1, std::atoi(v->c_str()));
-        else if (const auto v = value("folder")) settings.folder = *v;
+        if (const auto seed = value("seed")) settings.seed = std::strtoull(seed->c_str(), nullptr, 10);
+        else if (const auto count = value("count")) settings.count = std::strtoull(count->c_str(), nullptr, 10);
+        else if (const auto workers = value("workers")) settings.workers = std::max(1, std::atoi(workers->c_str()));
+        else if (const auto folder = value("folder")) settings.folder = *folder;
         else if (text == "--no-reduction") settings.reduces = false;
         else if (text == "--print") {
             std::cout << nacre::differential::generate(settings.seed).text;

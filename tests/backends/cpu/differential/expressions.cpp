@@ -25,14 +25,14 @@ std::string Generator::literal(const GlslType& type) {
     switch (type.kind) {
         case Kind::boolean: scalar = random_.chance(50) ? "true" : "false"; break;
         case Kind::integer:
-            scalar = random_.chance(70) ? fmt::format("{}", random_.between(-9, 40))
-                                        : random_.pick({"2147483647", "(-2147483647 - 1)", "-1", "0", "65535", "-65536"});
+            scalar = random_.chance(70) ? fmt::format("({})", random_.between(-9, 40))
+                                        : random_.pick({"2147483647", "(-2147483647 - 1)", "(-1)", "0", "65535", "(-65536)"});
             break;
         case Kind::natural:
             scalar = random_.chance(70) ? fmt::format("{}u", random_.between(0, 40))
                                         : random_.pick({"0xffffffffu", "0x80000000u", "0x12345678u", "0xffffu"});
             break;
-        case Kind::real: scalar = fmt::format("{:.4f}", random_.between(1, 400) / 16.0 - 12.03125); break;
+        case Kind::real: scalar = fmt::format("({:.5f})", random_.between(1, 400) / 16.0 - 12.03125); break;
         case Kind::matrix: return fmt::format("{}({}.0)", type.name(), random_.between(1, 9));
     }
     return type.size == 1 ? scalar : fmt::format("{}({})", type.name(), scalar);
@@ -40,7 +40,11 @@ std::string Generator::literal(const GlslType& type) {
 
 std::string Generator::index(int count) {
     if (random_.chance(30)) return fmt::format("{}", random_.below(count));
+    // Indices of indices end soon.
+    if (index_depth_ >= 2) return fmt::format("(identity % {}u)", count);
+    ++index_depth_;
     const std::string number = random_.chance(60) ? leaf({Kind::natural, 1, 1}) : expression({Kind::natural, 1, 1}, 1);
+    --index_depth_;
     if ((count & (count - 1)) == 0 && random_.chance(50)) return fmt::format("({} & {}u)", number, count - 1);
     return fmt::format("({} % {}u)", number, count);
 }
@@ -196,7 +200,7 @@ std::string Generator::integer_expression(const GlslType& type, int depth) {
         }
         case 17: return fmt::format("{}({})", type.name(), expression(is_signed ? natural : integer, down));
         case 18: return fmt::format("{}({})", type.name(), expression({Kind::boolean, type.size, 1}, down));
-        case 19: return fmt::format("{}(small({}))", type.name(), is_signed ? expression(real, down) : fmt::format("abs({})", expression(real, down)));
+        case 19: return fmt::format("{}(keep({}))", type.name(), is_signed ? expression(real, down) : fmt::format("abs({})", expression(real, down)));
         case 20:
             return fmt::format("{}({})", is_signed ? "floatBitsToInt" : "floatBitsToUint", fmt::format("keep({})", expression(real, down)));
         case 21: return is_signed ? fmt::format("sign({})", one()) : fmt::format("({} ^ {})", one(), one());

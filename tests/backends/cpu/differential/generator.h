@@ -101,6 +101,7 @@ class Generator {
     std::vector<GlslFunction> functions_;
     GlslFunction* current_ = nullptr;       ///< Null: main.
     int indent_ = 0, depth_ = 0, names_ = 0, budget_ = 0;
+    int index_depth_ = 0;                   ///< Indices within indices.
     int loops_ = 0, switches_ = 0;          ///< Around the statement, within the function.
     bool only_uniform_ = false;             ///< Leaves are of what is equal in all invocations.
     bool is_divergent_ = false;             ///< Some invocations may be elsewhere: no barrier.

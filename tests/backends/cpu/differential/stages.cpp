@@ -11,7 +11,7 @@ namespace {
 
 const char* const shared_text = R"(
 struct Mixed { int a; vec3 b; uint c[3]; mat2x3 d; float e; ivec2 f; };
-struct Item { Mixed s; layout(row_major) mat4x3 m; layout(row_major) mat2x4 k[2]; int x[5]; vec3 y; uvec2 z; mat3 n; };
+struct Item { Mixed s; mat4x3 m; mat2x4 k[2]; int x[5]; vec3 y; uvec2 z; mat3 n; };
 layout(set = 0, binding = 0, std430) readonly buffer Input { uint words[256]; };
 layout(set = 0, binding = 1, std140) uniform Numbers { uvec4 w; ivec3 i; int one; int list[4]; uvec2 pairs[3]; } numbers_block;
 layout(set = 0, binding = 2, std140) uniform Reals { float f; vec3 v; layout(row_major) mat3x4 m; mat2x3 n; Mixed s[3];
@@ -21,7 +21,7 @@ layout(set = 0, binding = 3) uniform usampler2D numbers;
 
 const char* const compute_text = R"(
 layout(set = 0, binding = 4, std430) buffer Result { uint result[]; };
-layout(set = 0, binding = 5, std430) buffer Items { uint head; Item items[]; };
+layout(set = 0, binding = 5, std430) buffer Items { uint head; layout(row_major) Item items[]; };
 layout(set = 0, binding = 6, std430) buffer Counters { uint counters[24]; };
 layout(set = 0, binding = 7, std430) buffer Pairs { vec2 pairs[]; };
 layout(set = 0, binding = 8, r32ui) uniform uimage2D texels;
@@ -82,7 +82,7 @@ void Generator::declarations() {
         line("layout(location = 1) in vec2 ramp;");
     } else {
         line("layout(location = 0) flat out uvec4 color;");
-        line("layout(location = 0) in uvec4 attribute;");
+        line("layout(location = 0) in uvec4 per_vertex;");
     }
     shader_.text += shared_text;
     if (shader_.stage == Stage::compute) shader_.text += compute_text;
@@ -128,7 +128,7 @@ void Generator::declarations() {
         add("ivec2(gl_FragCoord.xy)", integer(2), 0, false);
         add("floor(ramp)", real(2), 0, false);
     } else {
-        add("attribute", natural(4), 0, false);
+        add("per_vertex", natural(4), 0, false);
         add("gl_VertexIndex", integer(1), 0, false);
         add("gl_InstanceIndex", integer(1), 0, true);
     }
