@@ -97,6 +97,9 @@ std::string Comparison::reduce(const GeneratedShader& shader, const Difference& 
     const bool is_error = difference.what.find(": ") != std::string::npos && difference.what.starts_with(difference.first + ": ");
     const auto still_differs = [&](const std::vector<std::string>& candidate) {
         const std::string text = joined(candidate);
+        // Outputs that nothing writes would be undefined.
+        for (const char* needed : {"\n  color = ", "\n  gl_Position = ", "\n  gl_PointSize = "})
+            if (shader.text.find(needed) != std::string::npos && text.find(needed) == std::string::npos) return false;
         if (!compile(text, shader.stage)) return false;
         if (difference.first == difference.second) {
             const auto output = run(difference.first, text, shader.stage);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Random shaders on the CPU backend with several lane widths and on Vulkan: their outputs must be equal.
 //
-//     cpu_differential_test                                        300 shaders with fixed seeds
+//     cpu_differential_test                                        40 shaders with fixed seeds
 //     cpu_differential_test --seed=1000 --count=10000 --folder=/tmp/found
-//     cpu_differential_test --seed=1234 --count=1 --print          the text of one shader
+//     cpu_differential_test --seed=1234 --print                    the text of one shader
+//     cpu_differential_test --seed=1234 --try=changed.glsl         a text of that seed's stage on all devices
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -30,7 +31,7 @@ namespace {
 
 struct Settings {
     std::uint64_t seed = 1;
-    std::uint64_t count = 300;
+    std::uint64_t count = 40;  ///< About half a minute on two cores.
     int workers = 2;
     std::string folder;   ///< Where shaders go that differ; empty: the test's temporary folder.
     bool reduces = true;
@@ -154,7 +155,7 @@ Tally run_all(bool has_vulkan) {
                 if (text.starts_with("seed ")) {
                     worker.seed = std::strtoull(text.c_str() + 5, nullptr, 10);
                     worker.device = "none", worker.since = std::chrono::steady_clock::now();
-                    if (++tally.shaders % 1000 == 0) std::cout << tally.shaders << " shaders" << std::endl;
+                    if (++tally.shaders % 100 == 0) std::cout << tally.shaders << " shaders" << std::endl;
                 } else if (text.starts_with("device ")) {
                     worker.device = text.substr(7);
                 } else if (text.starts_with("differs ")) {
@@ -212,6 +213,21 @@ int main(int argc, char** argv) {
         else if (text == "--no-reduction") settings.reduces = false;
         else if (text == "--print") {
             std::cout << nacre::differential::generate(settings.seed).text;
+            return 0;
+        } else if (const auto path = value("try")) {
+            // One text on all devices, its stage told by the seed: where it differs, and the first words.
+            auto shader = nacre::differential::generate(settings.seed);
+            std::ifstream file(*path);
+            shader.text.assign(std::istreambuf_iterator<char>(file), {});
+            for (const char* spec : {"cpu:consistent", "cpu:fast:lanes=4", "vulkan"}) {
+                auto runner = nacre::differential::DeviceRunner::create(spec);
+                auto words = nacre::differential::compile(shader.text, shader.stage);
+                if (!runner || !words) return 1;
+                const auto output = (*runner)->run(*words, shader.stage);
+                std::cout << spec << ":";
+                for (std::size_t word = 0; output && word < 8; ++word) std::cout << fmt::format(" {:#x}", output->words[word]);
+                std::cout << (output ? "" : output.error().message()) << "\n";
+            }
             return 0;
         } else {
             std::cerr << "unknown argument " << text << "\n";

@@ -234,7 +234,7 @@ std::string Generator::real_expression(const GlslType& type, int depth) {
         case 12: return fmt::format("step({}, {})", one(), one());
         case 13: return fmt::format("clamp({}, -3.25, 70.5)", one());
         case 14:
-            if (type.size == 2) return fmt::format("unpackHalf2x16(({} & 0x3fff3fffu) | 0x10001000u)", expression({Kind::natural, 1, 1}, down));
+            // No unpackHalf2x16: lavapipe of Mesa 22.3 gets some constants wrong.
             if (type.size == 1) {
                 // Sums of small whole numbers, exact in any order.
                 const int size = random_.between(2, 4);
