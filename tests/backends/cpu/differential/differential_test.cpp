@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Random shaders on the CPU backend with several lane widths and on Vulkan: their outputs must be equal.
 //
-//     cpu_differential_test                                        40 shaders with fixed seeds
+//     cpu_differential_test                                        20 shaders with fixed seeds
 //     cpu_differential_test --seed=1000 --count=10000 --folder=/tmp/found
 //     cpu_differential_test --seed=1234 --print                    the text of one shader
 //     cpu_differential_test --seed=1234 --try=changed.glsl         a text of that seed's stage on all devices
@@ -31,7 +31,7 @@ namespace {
 
 struct Settings {
     std::uint64_t seed = 1;
-    std::uint64_t count = 40;  ///< About half a minute on two cores.
+    std::uint64_t count = 20;  ///< What two cores do in about half a minute.
     int workers = 2;
     std::string folder;   ///< Where shaders go that differ; empty: the test's temporary folder.
     bool reduces = true;
