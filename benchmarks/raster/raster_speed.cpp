@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Time of the rasterizer alone at 1920x1080, with shaders written in C++: a position and eight values for each vertex, three words of
-// 32 bits for each pixel.
+// Time of the rasterizer alone at 1920x1080, with shaders written in C++: a position and eight values for each vertex,
+// three words of 32 bits for each pixel.
 //
 //     raster_speed_benchmark [threads [runs [instruction set: 0 baseline, 1 AVX2, 2 AVX-512]]]
 #include <fmt/core.h>
@@ -74,14 +74,16 @@ struct Vertex {
     float position[4], values[value_count];
 };
 
-void vertex_function(const cpu::ShaderContext*, const cpu::VertexDraw* draw, cpu::VertexBatch* batches, std::uint32_t count) {
+void vertex_function(const cpu::ShaderContext*, const cpu::VertexDraw* draw, cpu::VertexBatch* batches,
+                     std::uint32_t count) {
     const auto* const vertices = reinterpret_cast<const Vertex*>(draw->buffers[0].data);
     for (std::uint32_t b = 0; b < count; ++b)
         for (std::uint32_t lane = 0; lane < lanes; ++lane) {
             const Vertex& vertex = vertices[batches[b].indices[lane]];
             float* const out = batches[b].outputs + lane;
             for (std::uint32_t i = 0; i < 4; ++i) out[i * cpu::max_lanes] = vertex.position[i];
-            for (std::uint32_t i = 0; i < value_count; ++i) out[(cpu::first_user_slot + i) * cpu::max_lanes] = vertex.values[i];
+            for (std::uint32_t i = 0; i < value_count; ++i)
+                out[(cpu::first_user_slot + i) * cpu::max_lanes] = vertex.values[i];
         }
 }
 
@@ -120,8 +122,9 @@ void fragment_function(const cpu::ShaderContext*, cpu::FragmentBatch* batches, s
         const Floats w = 1.0f / plane([](const cpu::PrimitiveData& p) -> const cpu::Plane& { return p.inverse_w; });
         Words words[value_count];
         for (std::uint32_t i = 0; i < value_count; ++i) {
-            const Floats value = w * plane([&](const cpu::PrimitiveData& p) -> const cpu::Plane& { return p.varyings()[i]; });
-            words[i] = (Words)__builtin_convertvector(value * 1000.0f, Integers);
+            const Floats value =
+                w * plane([&](const cpu::PrimitiveData& p) -> const cpu::Plane& { return p.varyings()[i]; });
+            words[i] = (Words) __builtin_convertvector(value * 1000.0f, Integers);
         }
         const Words packed[3] = {words[0] | words[1] << 16, words[2] | words[3] << 10 | words[4] << 20,
                                  words[5] | words[6] << 10 | words[7] << 20};
@@ -130,16 +133,19 @@ void fragment_function(const cpu::ShaderContext*, cpu::FragmentBatch* batches, s
 }
 
 /// A wavy sheet of about `triangles` triangles over the part of the picture that `scale` says.
-void make_sheet(std::uint32_t triangles, float scale, float z, std::vector<Vertex>& vertices, std::vector<std::uint32_t>& indices) {
+void make_sheet(std::uint32_t triangles, float scale, float z, std::vector<Vertex>& vertices,
+                std::vector<std::uint32_t>& indices) {
     const auto columns = static_cast<std::uint32_t>(std::max(1.0, std::sqrt(triangles / 2.0 * 16 / 9)));
     const std::uint32_t rows = std::max(1u, triangles / 2 / columns);
     const auto first = static_cast<std::uint32_t>(vertices.size());
     for (std::uint32_t j = 0; j <= rows; ++j)
         for (std::uint32_t i = 0; i <= columns; ++i) {
-            const float u = static_cast<float>(i) / static_cast<float>(columns), v = static_cast<float>(j) / static_cast<float>(rows);
+            const float u = static_cast<float>(i) / static_cast<float>(columns),
+                        v = static_cast<float>(j) / static_cast<float>(rows);
             const float w = 1.0f + 0.3f * v;
-            vertices.push_back({{(2 * u - 1) * scale * w, (2 * v - 1) * scale * w, (z + 0.02f * std::sin(20 * u)) * w, w},
-                                {u, v, u * v, 1 - u, 1 - v, u, v, u}});
+            vertices.push_back(
+                {{(2 * u - 1) * scale * w, (2 * v - 1) * scale * w, (z + 0.02f * std::sin(20 * u)) * w, w},
+                 {u, v, u * v, 1 - u, 1 - v, u, v, u}});
         }
     for (std::uint32_t j = 0; j < rows; ++j)
         for (std::uint32_t i = 0; i < columns; ++i) {
@@ -203,7 +209,9 @@ int main(int argc, char** argv) {
         cpu::RasterPipeline pipeline;
         pipeline.vertex.run = vertex_function;
         pipeline.vertex.output_slots = cpu::first_user_slot + value_count;
-        pipeline.depth_stencil = {.format = rhi::Format::d32_float, .depth_test = true, .depth_write = true,
+        pipeline.depth_stencil = {.format = rhi::Format::d32_float,
+                                  .depth_test = true,
+                                  .depth_write = true,
                                   .depth_compare = rhi::CompareOperation::less};
         targets.colors.clear();
         if (!entry.depth_only) {
@@ -220,7 +228,8 @@ int main(int argc, char** argv) {
         }
         cpu::DrawState state;
         state.pipeline = &pipeline;
-        state.vertex.buffers[0] = {reinterpret_cast<const std::byte*>(vertices.data()), vertices.size() * sizeof(Vertex)};
+        state.vertex.buffers[0] = {reinterpret_cast<const std::byte*>(vertices.data()),
+                                   vertices.size() * sizeof(Vertex)};
         state.viewport = {0, 0, width, height, 0, 1};
         state.scissor = {0, 0, width, height};
         cpu::DrawCall call;
@@ -237,15 +246,16 @@ int main(int argc, char** argv) {
             rasterizer.begin_pass(targets);
             rasterizer.draw(state, call);
             rasterizer.end_pass();
-            times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+            times.push_back(
+                std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
             work_times.push_back(static_cast<double>(std::clock() - work_begin) * 1000.0 / CLOCKS_PER_SEC);
             passed = rasterizer.passed_samples();
         }
         std::sort(times.begin(), times.end());
         // Processor time counts on a busy machine, with one thread (several wait actively).
         std::sort(work_times.begin(), work_times.end());
-        fmt::print("{:44} least {:6.2f} ms, median {:6.2f} ms, processor {:6.2f} ms, {} samples\n", entry.name, times.front(),
-                   times[times.size() / 2], work_times.front(), passed);
+        fmt::print("{:44} least {:6.2f} ms, median {:6.2f} ms, processor {:6.2f} ms, {} samples\n", entry.name,
+                   times.front(), times[times.size() / 2], work_times.front(), passed);
     }
     return EXIT_SUCCESS;
 }

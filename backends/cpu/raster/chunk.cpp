@@ -23,12 +23,16 @@ class Assembler {
   public:
     Assembler(Chunk& chunk, const QueuedDraw& draw, std::uint32_t draw_index, const TargetSet& targets,
               ChunkScratch& scratch)
-        : chunk_(chunk), draw_(draw), pipeline_(*draw.pipeline), targets_(targets), scratch_(scratch),
+        : chunk_(chunk),
+          draw_(draw),
+          pipeline_(*draw.pipeline),
+          targets_(targets),
+          scratch_(scratch),
           draw_bits_(draw_index << Record::draw_shift) {}
 
     void triangle(std::uint32_t local0, std::uint32_t local1, std::uint32_t local2, std::uint32_t primitive_id);
-    void line(std::uint32_t local0, std::uint32_t local1, std::uint32_t provoking, std::uint32_t primitive_id, bool front,
-              bool is_edge);
+    void line(std::uint32_t local0, std::uint32_t local1, std::uint32_t provoking, std::uint32_t primitive_id,
+              bool front, bool is_edge);
     void point(std::uint32_t local, std::uint32_t primitive_id);
 
   private:
@@ -46,18 +50,15 @@ class Assembler {
     const ScreenVertex& vertex(std::uint32_t offset) const {
         return *reinterpret_cast<const ScreenVertex*>(chunk_.vertices.data() + static_cast<std::size_t>(offset) * 16);
     }
-    bool culled(bool front) const {
-        return pipeline_.cull == (front ? rhi::CullMode::front : rhi::CullMode::back);
-    }
-    bool faces_front(bool clockwise) const {
-        return clockwise == (pipeline_.front_face == rhi::FrontFace::clockwise);
-    }
+    bool culled(bool front) const { return pipeline_.cull == (front ? rhi::CullMode::front : rhi::CullMode::back); }
+    bool faces_front(bool clockwise) const { return clockwise == (pipeline_.front_face == rhi::FrontFace::clockwise); }
     double bias(double slope, double largest_depth) const;
     Source window_source(const SetupVertex& v0, const SetupVertex& v1, const SetupVertex& v2, const Corners& snapped,
                          bool clockwise, std::uint32_t primitive_id) const;
     bool homogeneous_source(const SetupVertex (&vertices)[3], std::uint32_t primitive_id, Source& source) const;
     void clipped_triangle(const std::uint32_t (&locals)[3], std::uint32_t codes, std::uint32_t primitive_id);
-    void outline(std::uint32_t local0, std::uint32_t local1, std::uint32_t local2, std::uint32_t primitive_id, bool front);
+    void outline(std::uint32_t local0, std::uint32_t local1, std::uint32_t local2, std::uint32_t primitive_id,
+                 bool front);
     int gather_planes(const std::uint32_t* locals, int count, std::uint32_t codes, ClipPlane* planes) const;
     std::uint32_t vertex_between(const SetupVertex& a, const SetupVertex& b, double t);
     void add(const Corners& corners, const Source& source, std::uint32_t bits);
@@ -79,7 +80,9 @@ double Assembler::bias(double slope, double largest_depth) const {
     switch (draw_.depth_layout) {
         case DepthLayout::unorm16: unit = 0x1p-16; break;
         case DepthLayout::unorm24: unit = 0x1p-24; break;
-        default: unit = largest_depth > 0.0 ? std::ldexp(1.0, std::max(std::ilogb(largest_depth), -126) - 23) : 0.0; break;
+        default:
+            unit = largest_depth > 0.0 ? std::ldexp(1.0, std::max(std::ilogb(largest_depth), -126) - 23) : 0.0;
+            break;
     }
     double result = slope * state.depth_bias_slope + unit * state.depth_bias;
     if (state.depth_bias_clamp > 0.0f) result = std::min(result, static_cast<double>(state.depth_bias_clamp));
@@ -137,8 +140,8 @@ bool Assembler::homogeneous_source(const SetupVertex (&vertices)[3], std::uint32
     }
     const double scale = draw_.plan.scale[2];
     source.depth = {depth.c * scale + draw_.plan.translation[2], depth.dx * scale, depth.dy * scale};
-    source.depth.c += bias(std::max(std::abs(source.depth.dx), std::abs(source.depth.dy)),
-                           largest_depth > 0.0 ? largest_depth : 1.0);
+    source.depth.c +=
+        bias(std::max(std::abs(source.depth.dx), std::abs(source.depth.dy)), largest_depth > 0.0 ? largest_depth : 1.0);
     return true;
 }
 
@@ -187,9 +190,7 @@ void Assembler::add(const Corners& corners, const Source& source, std::uint32_t 
     }
     record.primitive_id = source.primitive_id;
     record.bits = bits | draw_bits_ | static_cast<std::uint32_t>(source.kind) << Record::source_shift;
-    const auto bounded = [](double slope) {
-        return std::abs(slope) < steepest ? static_cast<float>(slope) : 0.0f;
-    };
+    const auto bounded = [](double slope) { return std::abs(slope) < steepest ? static_cast<float>(slope) : 0.0f; };
     record.depth_c = bounded(source.depth.c), record.depth_dx = bounded(source.depth.dx);
     record.depth_dy = bounded(source.depth.dy);
     record.x0 = source.x0, record.y0 = source.y0;
@@ -207,8 +208,8 @@ void Assembler::triangle(std::uint32_t local0, std::uint32_t local1, std::uint32
             return;
         }
     }
-    const std::int64_t area = static_cast<std::int64_t>(v1.x - v0.x) * (v2.y - v0.y) -
-                              static_cast<std::int64_t>(v2.x - v0.x) * (v1.y - v0.y);
+    const std::int64_t area =
+        static_cast<std::int64_t>(v1.x - v0.x) * (v2.y - v0.y) - static_cast<std::int64_t>(v2.x - v0.x) * (v1.y - v0.y);
     if (area == 0 && pipeline_.fill == rhi::FillMode::fill) return;
     const bool clockwise = area > 0, front = faces_front(clockwise);
     if (culled(front)) return;
@@ -234,8 +235,8 @@ void Assembler::triangle(std::uint32_t local0, std::uint32_t local1, std::uint32
         add({{v0.x, v2.x, v1.x}, {v0.y, v2.y, v1.y}}, source, bits | Record::swapped);
 }
 
-/// The planes that the codes ask for. Vertices without a code count as inside whatever rounding says: their neighbors, which are not
-/// clipped, use them as they are.
+/// The planes that the codes ask for. Vertices without a code count as inside whatever rounding says: their neighbors,
+/// which are not clipped, use them as they are.
 int Assembler::gather_planes(const std::uint32_t* locals, int count, std::uint32_t codes, ClipPlane* planes) const {
     int plane_count = 0;
     const auto add_plane = [&](std::uint32_t code, auto&& value) {
@@ -256,7 +257,8 @@ int Assembler::gather_planes(const std::uint32_t* locals, int count, std::uint32
                 });
     }
     if (codes & outside_near)
-        add_plane(outside_near, [](const ScreenVertex& corner, std::uint32_t) { return static_cast<double>(corner.clip[2]); });
+        add_plane(outside_near,
+                  [](const ScreenVertex& corner, std::uint32_t) { return static_cast<double>(corner.clip[2]); });
     if (codes & outside_far)
         add_plane(outside_far, [](const ScreenVertex& corner, std::uint32_t) {
             return static_cast<double>(corner.clip[3]) - corner.clip[2];
@@ -275,7 +277,8 @@ void Assembler::clipped_triangle(const std::uint32_t (&locals)[3], std::uint32_t
         // Which way it faces is the sign of the homogeneous determinant, also behind the eye.
         ScreenPoint points[3];
         for (int i = 0; i < 3; ++i)
-            points[i] = screen_point(vertex(scratch_.setup[locals[i]].offset).clip, draw_.plan.scale, draw_.plan.translation);
+            points[i] =
+                screen_point(vertex(scratch_.setup[locals[i]].offset).clip, draw_.plan.scale, draw_.plan.translation);
         const double determinant = points[0].x * (points[1].y * points[2].w - points[1].w * points[2].y) +
                                    points[0].y * (points[1].w * points[2].x - points[1].x * points[2].w) +
                                    points[0].w * (points[1].x * points[2].y - points[1].y * points[2].x);
@@ -327,10 +330,10 @@ void Assembler::clipped_triangle(const std::uint32_t (&locals)[3], std::uint32_t
             if (codes & outside_guard) {
                 if (!homogeneous_source(vertices, primitive_id, source)) return;
             } else {
-                source = window_source(vertices[0], vertices[1], vertices[2],
-                                       {{vertices[0].x, vertices[1].x, vertices[2].x},
-                                        {vertices[0].y, vertices[1].y, vertices[2].y}},
-                                       clockwise, primitive_id);
+                source = window_source(
+                    vertices[0], vertices[1], vertices[2],
+                    {{vertices[0].x, vertices[1].x, vertices[2].x}, {vertices[0].y, vertices[1].y, vertices[2].y}},
+                    clockwise, primitive_id);
                 // Planes from rounded corners need those in the record, which has others here.
                 if (source.kind == PlaneSource::snapped && !homogeneous_source(vertices, primitive_id, source)) return;
             }
@@ -395,9 +398,12 @@ void Assembler::line(std::uint32_t local0, std::uint32_t local1, std::uint32_t p
             if (t == i) continue;
             source.vertices[i] = vertex_between(ends[0], ends[1], t);
             const ScreenVertex& made = vertex(source.vertices[i]);
-            if (!std::isfinite(made.x) || !std::isfinite(made.y) || !std::isfinite(made.z) || !(made.inverse_w > 0.0f)) return;
-            corners.x[i] = static_cast<std::int32_t>(std::nearbyint(std::clamp(made.x, -guard_band, guard_band) * subpixels));
-            corners.y[i] = static_cast<std::int32_t>(std::nearbyint(std::clamp(made.y, -guard_band, guard_band) * subpixels));
+            if (!std::isfinite(made.x) || !std::isfinite(made.y) || !std::isfinite(made.z) || !(made.inverse_w > 0.0f))
+                return;
+            corners.x[i] =
+                static_cast<std::int32_t>(std::nearbyint(std::clamp(made.x, -guard_band, guard_band) * subpixels));
+            corners.y[i] =
+                static_cast<std::int32_t>(std::nearbyint(std::clamp(made.y, -guard_band, guard_band) * subpixels));
         }
     }
     const ScreenVertex &a = vertex(source.vertices[0]), &b = vertex(source.vertices[1]);
@@ -414,12 +420,15 @@ void Assembler::line(std::uint32_t local0, std::uint32_t local1, std::uint32_t p
         return;
     }
     // With several samples: a parallelogram of one pixel along the smaller extent.
-    const std::int32_t length_x = std::abs(corners.x[1] - corners.x[0]), length_y = std::abs(corners.y[1] - corners.y[0]);
+    const std::int32_t length_x = std::abs(corners.x[1] - corners.x[0]),
+                       length_y = std::abs(corners.y[1] - corners.y[0]);
     if (length_x == 0 && length_y == 0) return;
     const std::int32_t half = subpixels / 2;
     const std::int32_t shift_x = length_x >= length_y ? 0 : half, shift_y = length_x >= length_y ? half : 0;
-    const std::int32_t x[4] = {corners.x[0] - shift_x, corners.x[1] - shift_x, corners.x[1] + shift_x, corners.x[0] + shift_x};
-    const std::int32_t y[4] = {corners.y[0] - shift_y, corners.y[1] - shift_y, corners.y[1] + shift_y, corners.y[0] + shift_y};
+    const std::int32_t x[4] = {corners.x[0] - shift_x, corners.x[1] - shift_x, corners.x[1] + shift_x,
+                               corners.x[0] + shift_x};
+    const std::int32_t y[4] = {corners.y[0] - shift_y, corners.y[1] - shift_y, corners.y[1] + shift_y,
+                               corners.y[0] + shift_y};
     for (int i = 1; i < 3; ++i) {
         const std::int64_t area = static_cast<std::int64_t>(x[i] - x[0]) * (y[i + 1] - y[0]) -
                                   static_cast<std::int64_t>(x[i + 1] - x[0]) * (y[i] - y[0]);
@@ -439,7 +448,8 @@ void Assembler::point(std::uint32_t local, std::uint32_t primitive_id) {
     const ScreenVertex& from = vertex(center.offset);
     std::uint32_t size_bits;
     std::memcpy(&size_bits, &size, sizeof(size_bits));
-    const Source source{PlaneSource::point, {center.offset, size_bits, 0}, {from.z, 0.0, 0.0}, from.x, from.y, primitive_id};
+    const Source source{PlaneSource::point, {center.offset, size_bits, 0}, {from.z, 0.0, 0.0}, from.x, from.y,
+                        primitive_id};
     const auto extent = static_cast<std::int32_t>(std::nearbyint(size * subpixels));
     const std::int32_t left = center.x - extent / 2, top = center.y - extent / 2;
     const std::int32_t right = left + extent, bottom = top + extent;
@@ -455,7 +465,8 @@ void sort_into_bins(Chunk& chunk, const ChunkScratch& scratch, std::uint32_t til
     chunk.bin_offsets.assign(tile_count + 2, 0);
     for (const ChunkScratch::BinEntry& entry : scratch.entries) ++chunk.bin_offsets[entry.tile + 2];
     for (std::uint32_t tile = 2; tile < tile_count + 2; ++tile) chunk.bin_offsets[tile] += chunk.bin_offsets[tile - 1];
-    for (const ChunkScratch::BinEntry& entry : scratch.entries) chunk.bins[chunk.bin_offsets[entry.tile + 1]++] = entry.record;
+    for (const ChunkScratch::BinEntry& entry : scratch.entries)
+        chunk.bins[chunk.bin_offsets[entry.tile + 1]++] = entry.record;
 }
 
 }  // namespace
@@ -490,7 +501,9 @@ void build_chunk(Chunk& chunk, const std::vector<std::unique_ptr<QueuedDraw>>& d
                 case rhi::Topology::line_list:
                     assembler.line(locals[2 * i], locals[2 * i + 1], locals[2 * i], id, true, false);
                     break;
-                case rhi::Topology::line_strip: assembler.line(locals[i], locals[i + 1], locals[i], id, true, false); break;
+                case rhi::Topology::line_strip:
+                    assembler.line(locals[i], locals[i + 1], locals[i], id, true, false);
+                    break;
                 case rhi::Topology::triangle_list:
                     assembler.triangle(locals[3 * i], locals[3 * i + 1], locals[3 * i + 2], id);
                     break;

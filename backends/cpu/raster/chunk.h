@@ -10,8 +10,8 @@
 #include "backends/cpu/raster/tile_data.h"
 
 /// @file
-/// The first half of the rasterizer: primitives of a chunk to records in bins. Chunks are independent of each other and hold their
-/// primitives in the order of the draws.
+/// The first half of the rasterizer: primitives of a chunk to records in bins. Chunks are independent of each other and
+/// hold their primitives in the order of the draws.
 
 namespace nacre::cpu::raster {
 
@@ -23,7 +23,8 @@ class AlignedMemory {
     bool reserve(std::size_t bytes, std::size_t kept) {
         if (bytes <= capacity_) return false;
         const std::size_t capacity = std::max(bytes, capacity_ + capacity_ / 2);
-        std::unique_ptr<std::byte, Free> grown(static_cast<std::byte*>(::operator new(capacity, std::align_val_t{64})));
+        std::unique_ptr<std::byte, Free> grown(
+            static_cast<std::byte*>(::operator new (capacity, std::align_val_t{64})));
         if (kept) std::memcpy(grown.get(), memory_.get(), kept);
         memory_ = std::move(grown);
         capacity_ = capacity;
@@ -33,7 +34,7 @@ class AlignedMemory {
 
   private:
     struct Free {
-        void operator()(std::byte* memory) const { ::operator delete(memory, std::align_val_t{64}); }
+        void operator()(std::byte* memory) const { ::operator delete (memory, std::align_val_t{64}); }
     };
     std::unique_ptr<std::byte, Free> memory_;
     std::size_t capacity_ = 0;

@@ -5,12 +5,12 @@
 #include <cstdint>
 
 /// @file
-/// Clipping of triangles and lines, in double precision. Corners are kept as weights of the original vertices, so that two
-/// triangles with a common edge cut it at the same place.
+/// Clipping of triangles and lines, in double precision. Corners are kept as weights of the original vertices, so that
+/// two triangles with a common edge cut it at the same place.
 
 namespace nacre::cpu::raster {
 
-inline constexpr int most_clip_planes = 14;                   ///< 4 of the guard band, near, far, 8 of the user.
+inline constexpr int most_clip_planes = 14;  ///< 4 of the guard band, near, far, 8 of the user.
 inline constexpr int most_corners = 3 + most_clip_planes;
 
 /// Values at the three vertices; inside is where they are not negative.

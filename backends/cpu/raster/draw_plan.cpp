@@ -36,7 +36,8 @@ void plan_colors(const RasterPipeline& pipeline, const TargetSet& targets, DrawP
         plan.dual_source = plan.dual_source || output.output == dual_source_output;
     for (const FragmentOutput& output : pipeline.fragment.outputs) {
         const std::uint32_t index = output.output;
-        if (index >= targets.color_count || index >= pipeline.color_targets.size() || !targets.colors[index].data) continue;
+        if (index >= targets.color_count || index >= pipeline.color_targets.size() || !targets.colors[index].data)
+            continue;
         const rhi::ColorTargetState& state = pipeline.color_targets[index];
         const rhi::Format format = targets.colors[index].format;
         ColorPlan color{};
@@ -56,9 +57,10 @@ void plan_colors(const RasterPipeline& pipeline, const TargetSet& targets, DrawP
             for (std::uint32_t bit = bits.first; bit < bits.first + bits.count; ++bit)
                 color.word_masks[bit / 32] |= 1u << (bit % 32);
         }
-        color.as_it_is = !color.blends && !color.partial && rhi::info(format).block_bytes == 4 * rhi::info(format).channels &&
-                         rhi::info(format).kind != rhi::FormatKind::unorm && rhi::info(format).kind != rhi::FormatKind::snorm &&
-                         color.components >= rhi::info(format).channels;
+        color.as_it_is =
+            !color.blends && !color.partial && rhi::info(format).block_bytes == 4 * rhi::info(format).channels &&
+            rhi::info(format).kind != rhi::FormatKind::unorm && rhi::info(format).kind != rhi::FormatKind::snorm &&
+            color.components >= rhi::info(format).channels;
         if (any) plan.colors[plan.color_count++] = color;
     }
 }
@@ -72,10 +74,16 @@ void plan_tests(const DrawState& state, const TargetSet& targets, bool hierarchi
     const RasterPipeline& pipeline = *state.pipeline;
     const FragmentProgram& fragment = pipeline.fragment;
     const rhi::DepthStencilState& from = pipeline.depth_stencil;
-    plan.depth_stencil = {from.depth_test, from.depth_test && from.depth_write, from.stencil_test, from.depth_clamp,
-                          from.depth_compare, state.stencil_reference,
+    plan.depth_stencil = {from.depth_test,
+                          from.depth_test && from.depth_write,
+                          from.stencil_test,
+                          from.depth_clamp,
+                          from.depth_compare,
+                          state.stencil_reference,
                           std::min(state.viewport.min_depth, state.viewport.max_depth),
-                          std::max(state.viewport.min_depth, state.viewport.max_depth), from.front, from.back};
+                          std::max(state.viewport.min_depth, state.viewport.max_depth),
+                          from.front,
+                          from.back};
 
     plan.alpha_to_coverage = false;
     for (const FragmentOutput& output : fragment.outputs)
@@ -95,8 +103,8 @@ void plan_tests(const DrawState& state, const TargetSet& targets, bool hierarchi
     // A fragment that fails against what is there now also fails against what the draw itself puts in front of it.
     plan.early_rejection = plan.late_tests && !fragment.has_side_effects && !plan.writes_depth && from.depth_test &&
                            !from.stencil_test && keeps_order(from.depth_compare);
-    plan.hierarchical = hierarchical_depth && from.depth_test && !from.stencil_test && keeps_order(from.depth_compare) &&
-                        (!plan.late_tests || plan.early_rejection);
+    plan.hierarchical = hierarchical_depth && from.depth_test && !from.stencil_test &&
+                        keeps_order(from.depth_compare) && (!plan.late_tests || plan.early_rejection);
 }
 
 /// Pixels that viewport and scissor leave. Points reach out of the viewport, all else is clipped by it.
@@ -106,7 +114,9 @@ void plan_rectangle(const DrawState& state, const TargetSet& targets, DrawPlan& 
     if (state.pipeline->topology != rhi::Topology::point_list) {
         const auto pixel = [&](double place, bool is_end) {
             // The first pixel whose center is not left of the place; with several samples the one that holds it.
-            const double whole = targets.samples == 1 ? std::ceil(place - 0.5) : is_end ? std::ceil(place) : std::floor(place);
+            const double whole = targets.samples == 1 ? std::ceil(place - 0.5)
+                                 : is_end             ? std::ceil(place)
+                                                      : std::floor(place);
             return static_cast<std::int64_t>(std::clamp(whole, -1e6, 1e6));
         };
         const rhi::Viewport& view = state.viewport;
@@ -132,7 +142,8 @@ TargetSet target_set(const RenderTargets& targets) {
     for (std::uint32_t i = 0; i < set.color_count; ++i) {
         const ImageView& view = targets.colors[i];
         const ImageLevel& level = view.levels[0];
-        set.colors[i] = {level.data, level.sample_stride, level.row_stride, rhi::info(view.format).block_bytes, view.format};
+        set.colors[i] = {level.data, level.sample_stride, level.row_stride, rhi::info(view.format).block_bytes,
+                         view.format};
     }
     const ImageView& view = targets.depth_stencil;
     switch (view.format) {

@@ -4,13 +4,14 @@
 #include "backends/cpu/raster/tile_data.h"
 
 /// @file
-/// How values at vertices become planes over the screen. Internal linkage, as in simd.h. In double precision where it is done
-/// once for a primitive; every caller gets the same bits.
+/// How values at vertices become planes over the screen. Internal linkage, as in simd.h. In double precision where it
+/// is done once for a primitive; every caller gets the same bits.
 
 namespace nacre::cpu::raster {
 namespace {
 
-/// A value with f[0] to f[2] at the vertices has the slopes (f1 - f0) * first_x + (f2 - f0) * second_x along x, and so on.
+/// A value with f[0] to f[2] at the vertices has the slopes (f1 - f0) * first_x + (f2 - f0) * second_x along x, and so
+/// on.
 struct SlopeWeights {
     double first_x, second_x, first_y, second_y;
 };
@@ -36,8 +37,9 @@ inline ScreenPoint screen_point(const float* clip, const double* scale, const do
     return {clip[0] * scale[0] + w * translation[0], clip[1] * scale[1] + w * translation[1], w};
 }
 
-/// value / w = sum over vertices of value_i * (x[i] * X + y[i] * Y + c[i]) at window coordinates (X, Y): valid for vertices behind
-/// the eye too. Source: Olano and Greer 1997, "Triangle scan conversion using 2D homogeneous coordinates".
+/// value / w = sum over vertices of value_i * (x[i] * X + y[i] * Y + c[i]) at window coordinates (X, Y): valid for
+/// vertices behind the eye too. Source: Olano and Greer 1997, "Triangle scan conversion using 2D homogeneous
+/// coordinates".
 struct HomogeneousWeights {
     double x[3], y[3], c[3];
     bool valid;
@@ -53,8 +55,7 @@ inline HomogeneousWeights homogeneous_weights(const ScreenPoint (&points)[3]) {
         weights.c[i] = a.x * b.y - a.y * b.x;
     };
     cross(0, points[1], points[2]), cross(1, points[2], points[0]), cross(2, points[0], points[1]);
-    const double determinant =
-        points[0].x * weights.x[0] + points[0].y * weights.y[0] + points[0].w * weights.c[0];
+    const double determinant = points[0].x * weights.x[0] + points[0].y * weights.y[0] + points[0].w * weights.c[0];
     const double scale = 1.0 / determinant;
     for (int i = 0; i < 3; ++i) weights.x[i] *= scale, weights.y[i] *= scale, weights.c[i] *= scale;
     double sum = 0.0;

@@ -6,13 +6,15 @@
 #include "backends/cpu/raster/tile_data.h"
 
 /// @file
-/// PrimitiveData of a record: done in the tiles, and only for primitives of which something is visible. Internal linkage, as in
-/// simd.h.
+/// PrimitiveData of a record: done in the tiles, and only for primitives of which something is visible. Internal
+/// linkage, as in simd.h.
 
 namespace nacre::cpu::raster {
 namespace {
 
-NACRE_LANES_INLINE Float4 select4(Int4 mask, Float4 a, Float4 b) { return (Float4)(((Int4)a & mask) | ((Int4)b & ~mask)); }
+NACRE_LANES_INLINE Float4 select4(Int4 mask, Float4 a, Float4 b) {
+    return (Float4)(((Int4)a & mask) | ((Int4)b & ~mask));
+}
 
 NACRE_LANES_INLINE void store_planes(Plane* planes, Float4 c, Float4 dx, Float4 dy, Int4 flat, Float4 provoking) {
     c = select4(flat, provoking, c);
@@ -49,8 +51,8 @@ inline void homogeneous_planes(const DrawPlan& draw, const Record& record, const
         for (int i = 0; i < 3; ++i)
             c += values[i] * base[i], dx += values[i] * weights.x[i], dy += values[i] * weights.y[i];
         if (draw.linear_masks[input] != 0 && !in_front) {
-            // What is linear on the screen has no meaning behind the eye: it is made linear between the corners of what is left
-            // after clipping.
+            // What is linear on the screen has no meaning behind the eye: it is made linear between the corners of what
+            // is left after clipping.
             double corners[3], x[3], y[3];
             for (int j = 0; j < 3; ++j) {
                 x[j] = record.x[j] * (1.0 / subpixels), y[j] = record.y[j] * (1.0 / subpixels);
@@ -122,8 +124,7 @@ inline void set_up_primitive(const DrawPlan& draw, const Record& record, const s
 
     const double w0 = vertices[0]->inverse_w;
     const double dw1 = vertices[1]->inverse_w - w0, dw2 = vertices[2]->inverse_w - w0;
-    primitive.inverse_w = {vertices[0]->inverse_w,
-                           static_cast<float>(dw1 * weights.first_x + dw2 * weights.second_x),
+    primitive.inverse_w = {vertices[0]->inverse_w, static_cast<float>(dw1 * weights.first_x + dw2 * weights.second_x),
                            static_cast<float>(dw1 * weights.first_y + dw2 * weights.second_y), 0.0f};
 
     const Float4 first_x = static_cast<float>(weights.first_x) - Float4{};
@@ -136,9 +137,12 @@ inline void set_up_primitive(const DrawPlan& draw, const Record& record, const s
         Int4 linear, flat;
         std::memcpy(&linear, draw.linear_masks + input, sizeof(linear));
         std::memcpy(&flat, draw.flat_masks + input, sizeof(flat));
-        const Float4 value0 = load4(vertices[0]->inputs() + input) * select4(linear, one, vertices[0]->inverse_w - Float4{});
-        const Float4 value1 = load4(vertices[1]->inputs() + input) * select4(linear, one, vertices[1]->inverse_w - Float4{});
-        const Float4 value2 = load4(vertices[2]->inputs() + input) * select4(linear, one, vertices[2]->inverse_w - Float4{});
+        const Float4 value0 =
+            load4(vertices[0]->inputs() + input) * select4(linear, one, vertices[0]->inverse_w - Float4{});
+        const Float4 value1 =
+            load4(vertices[1]->inputs() + input) * select4(linear, one, vertices[1]->inverse_w - Float4{});
+        const Float4 value2 =
+            load4(vertices[2]->inputs() + input) * select4(linear, one, vertices[2]->inverse_w - Float4{});
         const Float4 difference1 = value1 - value0, difference2 = value2 - value0;
         store_planes(planes, value0, difference1 * first_x + difference2 * second_x,
                      difference1 * first_y + difference2 * second_y, flat, load4(provoking->inputs() + input));

@@ -21,8 +21,8 @@ const Kernels& choose_kernels(std::uint32_t limit) {
 
 namespace {
 
-/// A chunk is what one task takes through the first half: small enough that all threads get some, large enough that vertices are
-/// shared and bins pay.
+/// A chunk is what one task takes through the first half: small enough that all threads get some, large enough that
+/// vertices are shared and bins pay.
 constexpr std::uint32_t chunk_primitives = 512;
 /// A slab goes through both halves together, which bounds memory; its vertices and records fit the last cache level.
 constexpr std::uint32_t slab_primitives = 32 * 1024;
@@ -45,7 +45,7 @@ struct Rasterizer::State {
 
     std::vector<std::unique_ptr<QueuedDraw>> draws;  ///< The first `draw_count` are used.
     std::uint32_t draw_count = 0;
-    std::vector<std::unique_ptr<Chunk>> chunks;      ///< The first `chunk_count` are used.
+    std::vector<std::unique_ptr<Chunk>> chunks;  ///< The first `chunk_count` are used.
     std::uint32_t chunk_count = 0;
     std::uint32_t primitives = 0;
 
@@ -58,9 +58,13 @@ struct Rasterizer::State {
     std::vector<std::uint8_t> tile_marks;
 
     State(Scheduler& of_scheduler, std::uint32_t lane_count, const RasterizerOptions& of_options)
-        : scheduler(of_scheduler), lanes(std::clamp(lane_count / 4 * 4, 4u, max_lanes)), options(of_options),
-          kernels(choose_kernels(of_options.instruction_set)), scratch(of_scheduler.thread_count()),
-          workspaces(of_scheduler.thread_count()), primitive_memory(of_scheduler.thread_count()) {
+        : scheduler(of_scheduler),
+          lanes(std::clamp(lane_count / 4 * 4, 4u, max_lanes)),
+          options(of_options),
+          kernels(choose_kernels(of_options.instruction_set)),
+          scratch(of_scheduler.thread_count()),
+          workspaces(of_scheduler.thread_count()),
+          primitive_memory(of_scheduler.thread_count()) {
         for (AlignedMemory& memory : workspaces) {
             memory.reserve(sizeof(Workspace), 0);
             std::memset(memory.data(), 0, sizeof(Workspace));
@@ -89,7 +93,8 @@ struct Rasterizer::State {
     void draw(const DrawState& state, const DrawCall& call) {
         const RasterPipeline& pipeline = *state.pipeline;
         const std::uint32_t count = primitives_of(pipeline.topology, call.count);
-        if (count == 0 || call.instance_count == 0 || !pipeline.vertex.run || targets.tiles_x == 0 || targets.tiles_y == 0)
+        if (count == 0 || call.instance_count == 0 || !pipeline.vertex.run || targets.tiles_x == 0 ||
+            targets.tiles_y == 0)
             return;
         if (draw_count == slab_draws) flush();
         std::uint32_t index = enqueue(state, call);
@@ -162,8 +167,8 @@ struct Rasterizer::State {
             primitive_memory[thread].reserve(primitive_bytes * primitive_slots, 0);
             workspace(thread).primitives = primitive_memory[thread].data();
         }
-        const TileJob job{&targets, views.data(), static_cast<std::uint32_t>(views.size()), plans.data(), lanes,
-                          &srgb_tables()};
+        const TileJob job{&targets,     views.data(), static_cast<std::uint32_t>(views.size()),
+                          plans.data(), lanes,        &srgb_tables()};
         run(static_cast<std::uint32_t>(busy_tiles.size()), [&](std::uint32_t index, std::uint32_t thread) {
             kernels.draw_tile(job, busy_tiles[index], workspace(thread));
         });
@@ -178,7 +183,8 @@ Rasterizer::~Rasterizer() = default;
 void Rasterizer::begin_pass(const RenderTargets& targets) {
     state_->discard_queue();
     state_->targets = target_set(targets);
-    for (std::uint32_t thread = 0; thread < state_->workspaces.size(); ++thread) state_->workspace(thread).passed_samples = 0;
+    for (std::uint32_t thread = 0; thread < state_->workspaces.size(); ++thread)
+        state_->workspace(thread).passed_samples = 0;
 }
 
 void Rasterizer::draw(const DrawState& state, const DrawCall& call) { state_->draw(state, call); }

@@ -11,8 +11,8 @@
 #endif
 
 /// @file
-/// Sixteen lanes of floats or integers in as many registers as the instruction set of the including file needs. Everything
-/// has internal linkage: each file that includes this is compiled for another instruction set.
+/// Sixteen lanes of floats or integers in as many registers as the instruction set of the including file needs.
+/// Everything has internal linkage: each file that includes this is compiled for another instruction set.
 ///
 /// Every operation gives the same bits on every instruction set.
 
@@ -52,7 +52,8 @@ struct Lanes {
 
 NACRE_LANES_INLINE Floats floats(float value) {
     Floats result;
-    NACRE_EACH result.part[i] = value - FloatRegister{};  // Adding zero would not keep a negative zero, and takes an addition.
+    NACRE_EACH result.part[i] =
+        value - FloatRegister{};  // Adding zero would not keep a negative zero, and takes an addition.
     return result;
 }
 NACRE_LANES_INLINE Ints ints(std::int32_t value) {
@@ -81,11 +82,11 @@ NACRE_LANES_INLINE void store(std::uint32_t* to, const Ints& value) { std::memcp
 NACRE_LANES_INLINE Ints bits_of(const Floats& value) { return __builtin_bit_cast(Ints, value); }
 NACRE_LANES_INLINE Floats floats_of_bits(const Ints& value) { return __builtin_bit_cast(Floats, value); }
 
-#define NACRE_BINARY(TYPE, OPERATOR)                                                    \
-    NACRE_LANES_INLINE TYPE operator OPERATOR(const TYPE& a, const TYPE& b) {           \
-        TYPE result;                                                                    \
-        NACRE_EACH result.part[i] = a.part[i] OPERATOR b.part[i];                       \
-        return result;                                                                  \
+#define NACRE_BINARY(TYPE, OPERATOR)                                          \
+    NACRE_LANES_INLINE TYPE operator OPERATOR(const TYPE& a, const TYPE& b) { \
+        TYPE result;                                                          \
+        NACRE_EACH result.part[i] = a.part[i] OPERATOR b.part[i];             \
+        return result;                                                        \
     }
 NACRE_BINARY(Floats, +)
 NACRE_BINARY(Floats, -)
@@ -96,11 +97,11 @@ NACRE_BINARY(Ints, |)
 NACRE_BINARY(Ints, ^)
 #undef NACRE_BINARY
 // Unsigned arithmetic underneath: integers wrap.
-#define NACRE_WRAPPING(OPERATOR)                                                                                     \
-    NACRE_LANES_INLINE Ints operator OPERATOR(const Ints& a, const Ints& b) {                                        \
-        Ints result;                                                                                                 \
-        NACRE_EACH result.part[i] = (IntRegister)((UintRegister)a.part[i] OPERATOR(UintRegister) b.part[i]);         \
-        return result;                                                                                               \
+#define NACRE_WRAPPING(OPERATOR)                                                                             \
+    NACRE_LANES_INLINE Ints operator OPERATOR(const Ints& a, const Ints& b) {                                \
+        Ints result;                                                                                         \
+        NACRE_EACH result.part[i] = (IntRegister)((UintRegister)a.part[i] OPERATOR(UintRegister) b.part[i]); \
+        return result;                                                                                       \
     }
 NACRE_WRAPPING(+)
 NACRE_WRAPPING(-)
@@ -122,12 +123,14 @@ NACRE_LANES_INLINE Ints shift_right(const Ints& a) {
 }
 NACRE_LANES_INLINE Ints shift_left(const Ints& a, int count) {
     Ints result;
-    NACRE_EACH result.part[i] = (IntRegister)((UintRegister)a.part[i] << (UintRegister{} + static_cast<std::uint32_t>(count)));
+    NACRE_EACH result.part[i] =
+        (IntRegister)((UintRegister)a.part[i] << (UintRegister{} + static_cast<std::uint32_t>(count)));
     return result;
 }
 NACRE_LANES_INLINE Ints shift_right(const Ints& a, int count) {
     Ints result;
-    NACRE_EACH result.part[i] = (IntRegister)((UintRegister)a.part[i] >> (UintRegister{} + static_cast<std::uint32_t>(count)));
+    NACRE_EACH result.part[i] =
+        (IntRegister)((UintRegister)a.part[i] >> (UintRegister{} + static_cast<std::uint32_t>(count)));
     return result;
 }
 NACRE_LANES_INLINE Floats to_floats(const Ints& a) {
@@ -182,11 +185,11 @@ NACRE_LANES_INLINE Floats select(const Lanes& which, const Floats& a, const Floa
     return {_mm512_mask_blend_ps(which.bits, b.part[0], a.part[0])};
 }
 #else
-#define NACRE_COMPARISON(NAME, TYPE, OPERATOR)                                                 \
-    NACRE_LANES_INLINE Lanes NAME(const TYPE& a, const TYPE& b) {                              \
-        Lanes result;                                                                          \
-        NACRE_EACH result.part[i] = (IntRegister)(a.part[i] OPERATOR b.part[i]);               \
-        return result;                                                                         \
+#define NACRE_COMPARISON(NAME, TYPE, OPERATOR)                                   \
+    NACRE_LANES_INLINE Lanes NAME(const TYPE& a, const TYPE& b) {                \
+        Lanes result;                                                            \
+        NACRE_EACH result.part[i] = (IntRegister)(a.part[i] OPERATOR b.part[i]); \
+        return result;                                                           \
     }
 NACRE_COMPARISON(less, Floats, <)
 NACRE_COMPARISON(less_or_equal, Floats, <=)
@@ -216,8 +219,9 @@ NACRE_LANES_INLINE std::uint32_t mask_of(const Lanes& a) {
 #endif
     return mask;
 }
-alignas(64) constexpr std::int32_t lane_bits[16] = {1,      1 << 1, 1 << 2,  1 << 3,  1 << 4,  1 << 5,  1 << 6,  1 << 7,
-                                                    1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15};
+alignas(64) constexpr std::int32_t lane_bits[16] = {1,       1 << 1,  1 << 2,  1 << 3, 1 << 4,  1 << 5,
+                                                    1 << 6,  1 << 7,  1 << 8,  1 << 9, 1 << 10, 1 << 11,
+                                                    1 << 12, 1 << 13, 1 << 14, 1 << 15};
 NACRE_LANES_INLINE Lanes lanes_of(std::uint32_t mask) {
     const Ints own = load(lane_bits);
     return equal(ints(static_cast<std::int32_t>(mask)) & own, own);
@@ -259,8 +263,10 @@ NACRE_LANES_INLINE void store4(float* to, Float4 value) { std::memcpy(to, &value
 
 /// Rows become columns.
 NACRE_LANES_INLINE void transpose(Float4& a, Float4& b, Float4& c, Float4& d) {
-    const Float4 ab_low = __builtin_shufflevector(a, b, 0, 4, 1, 5), ab_high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
-    const Float4 cd_low = __builtin_shufflevector(c, d, 0, 4, 1, 5), cd_high = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+    const Float4 ab_low = __builtin_shufflevector(a, b, 0, 4, 1, 5),
+                 ab_high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    const Float4 cd_low = __builtin_shufflevector(c, d, 0, 4, 1, 5),
+                 cd_high = __builtin_shufflevector(c, d, 2, 6, 3, 7);
     a = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
     b = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
     c = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);

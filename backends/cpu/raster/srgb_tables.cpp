@@ -16,8 +16,7 @@ SrgbTables make_tables() {
         tables.thresholds[code] = static_cast<float>(to_linear((code + 0.5) / 255.0));
     }
     for (std::uint32_t bucket = 0; bucket <= 13 * 64; ++bucket) {
-        const float low =
-            std::bit_cast<float>(SrgbTables::first_bits + (bucket << SrgbTables::bucket_shift));
+        const float low = std::bit_cast<float>(SrgbTables::first_bits + (bucket << SrgbTables::bucket_shift));
         std::uint32_t code = 0;
         while (code < 255 && low >= tables.thresholds[code]) ++code;
         tables.starts[bucket] = static_cast<std::uint8_t>(code);

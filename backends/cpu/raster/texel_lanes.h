@@ -68,14 +68,14 @@ inline TexelLayout texel_layout(rhi::Format format) {
     }
 }
 
-/// Bits of a float without sign and with 5 bits of exponent, `mantissa` bits of mantissa; halves to the even one. Values
-/// of `overflow` and above become infinity; what is not a number stays so.
+/// Bits of a float without sign and with 5 bits of exponent, `mantissa` bits of mantissa; halves to the even one.
+/// Values of `overflow` and above become infinity; what is not a number stays so.
 template <int mantissa>
 NACRE_LANES_INLINE Ints small_float(const Floats& magnitude, float overflow) {
     constexpr int dropped = 23 - mantissa;
     const Ints rebased = bits_of(magnitude) - ints(112 << 23);
-    const Ints rounded = shift_right<dropped>(rebased + ints((1 << (dropped - 1)) - 1) +
-                                              (shift_right<dropped>(rebased) & ints(1)));
+    const Ints rounded =
+        shift_right<dropped>(rebased + ints((1 << (dropped - 1)) - 1) + (shift_right<dropped>(rebased) & ints(1)));
     const Floats unit = floats(static_cast<float>(1 << (14 + mantissa)));
     const Floats tiny = select(less(magnitude, floats(1.0f)), magnitude, floats(0.0f));
     Ints result = select(less(magnitude, floats(0x1p-14f)), round_to_ints(tiny * unit), rounded);

@@ -6,21 +6,23 @@
 /// @file
 /// Which pixels and samples of a tile a triangle or line covers. Internal linkage, as in simd.h.
 ///
-/// Edge functions are exact: E(x, y) = A * (x - x0) + B * (y - y0) in 64 bits with 8 subpixel bits on each side, less one for edges
-/// whose own pixels belong to the neighbor (top-left rule). Samples lie a whole number of pixels apart, so that the low 8 bits
-/// of E, which are the same in all of them, can be cut off (rounding down keeps the sign), and the rest fits 32 bits
-/// wherever the edge crosses the tile.
+/// Edge functions are exact: E(x, y) = A * (x - x0) + B * (y - y0) in 64 bits with 8 subpixel bits on each side, less
+/// one for edges whose own pixels belong to the neighbor (top-left rule). Samples lie a whole number of pixels apart,
+/// so that the low 8 bits of E, which are the same in all of them, can be cut off (rounding down keeps the sign), and
+/// the rest fits 32 bits wherever the edge crosses the tile.
 
 namespace nacre::cpu::raster {
 namespace {
 
 /// Lanes of a block whose x (y) is at least, or at most, the index.
-constexpr std::uint32_t lanes_from_x[4] = {0xffff, 0xfafa, 0xf0f0, 0xa0a0}, lanes_to_x[4] = {0x0505, 0x0f0f, 0x5f5f, 0xffff};
-constexpr std::uint32_t lanes_from_y[4] = {0xffff, 0xffcc, 0xff00, 0xcc00}, lanes_to_y[4] = {0x0033, 0x00ff, 0x33ff, 0xffff};
+constexpr std::uint32_t lanes_from_x[4] = {0xffff, 0xfafa, 0xf0f0, 0xa0a0},
+                        lanes_to_x[4] = {0x0505, 0x0f0f, 0x5f5f, 0xffff};
+constexpr std::uint32_t lanes_from_y[4] = {0xffff, 0xffcc, 0xff00, 0xcc00},
+                        lanes_to_y[4] = {0x0033, 0x00ff, 0x33ff, 0xffff};
 
 /// Lanes of block (x, y) inside of the pixels [x0, x1] x [y0, y1] of the tile; the block has some.
-NACRE_LANES_INLINE std::uint32_t lanes_inside(std::int32_t block_x, std::int32_t block_y, std::int32_t x0, std::int32_t x1,
-                                              std::int32_t y0, std::int32_t y1) {
+NACRE_LANES_INLINE std::uint32_t lanes_inside(std::int32_t block_x, std::int32_t block_y, std::int32_t x0,
+                                              std::int32_t x1, std::int32_t y0, std::int32_t y1) {
     const std::int32_t left = x0 - 4 * block_x, right = x1 - 4 * block_x;
     const std::int32_t top = y0 - 4 * block_y, bottom = y1 - 4 * block_y;
     std::uint32_t lanes = 0xffff;
@@ -57,7 +59,8 @@ struct Coverage {
         y0 = ((low_y - last + subpixels - 1) >> subpixel_bits) - run.tile_y;
         y1 = ((high_y - first) >> subpixel_bits) - run.tile_y;
         const DrawPlan& draw = *run.draw;
-        const auto cut = [&](std::int32_t& low, std::int32_t& high, std::int32_t begin, std::int32_t end, std::int32_t size) {
+        const auto cut = [&](std::int32_t& low, std::int32_t& high, std::int32_t begin, std::int32_t end,
+                             std::int32_t size) {
             begin = begin > 0 ? begin : 0, end = end < size ? end : size;
             if (low < begin) low = begin, bounded = bounded || begin > 0;
             if (high >= end) high = end - 1, bounded = bounded || end < tile_size;
@@ -76,7 +79,8 @@ struct Coverage {
             for (std::uint32_t s = 0; s < samples; ++s) {
                 const std::int64_t x = run.tile_x * subpixels + (multisampled ? sample_offset_x[s] : subpixels / 2);
                 const std::int64_t y = run.tile_y * subpixels + (multisampled ? sample_offset_y[s] : subpixels / 2);
-                values[s] = (edge_a * (x - record.x[i]) + edge_b * (y - record.y[i]) - (owns_border ? 0 : 1)) >> subpixel_bits;
+                values[s] =
+                    (edge_a * (x - record.x[i]) + edge_b * (y - record.y[i]) - (owns_border ? 0 : 1)) >> subpixel_bits;
                 low = s == 0 || values[s] < low ? values[s] : low;
                 high = s == 0 || values[s] > high ? values[s] : high;
             }
@@ -101,8 +105,10 @@ struct Coverage {
     template <int edge_count>
     [[gnu::always_inline]] std::uint32_t covered(std::int32_t block_x, std::int32_t block_y, std::uint32_t s) const {
         Ints inside = steps[0] + ints(e[0][s] + a[0] * (4 * block_x) + b[0] * (4 * block_y));
-        if constexpr (edge_count > 1) inside = inside | (steps[1] + ints(e[1][s] + a[1] * (4 * block_x) + b[1] * (4 * block_y)));
-        if constexpr (edge_count > 2) inside = inside | (steps[2] + ints(e[2][s] + a[2] * (4 * block_x) + b[2] * (4 * block_y)));
+        if constexpr (edge_count > 1)
+            inside = inside | (steps[1] + ints(e[1][s] + a[1] * (4 * block_x) + b[1] * (4 * block_y)));
+        if constexpr (edge_count > 2)
+            inside = inside | (steps[2] + ints(e[2][s] + a[2] * (4 * block_x) + b[2] * (4 * block_y)));
         return mask_of(not_negative(inside));
     }
 
@@ -119,8 +125,8 @@ struct Coverage {
         std::uint32_t passed = 0;
         for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y) {
             // As in TileRun::depth_at; what is the same in a row of blocks is computed once.
-            const Floats along_y = floats(record.depth_dy) *
-                                   (center_y + floats(static_cast<float>(4 * block_y)) - floats(record.y0));
+            const Floats along_y =
+                floats(record.depth_dy) * (center_y + floats(static_cast<float>(4 * block_y)) - floats(record.y0));
             for (std::int32_t block_x = first_x; block_x <= last_x; ++block_x) {
                 std::uint32_t mask = bounded ? lanes_inside(block_x, block_y, x0, x1, y0, y1) : 0xffff;
                 if constexpr (edge_count > 0) mask &= covered<edge_count>(block_x, block_y, 0);
@@ -143,7 +149,8 @@ struct Coverage {
                 }
                 passed += static_cast<std::uint32_t>(__builtin_popcount(mask));
                 if (shades)
-                    run.append_block(0, run.tile_x + 4 * block_x, run.tile_y + 4 * block_y, place, mask, nullptr, nullptr);
+                    run.append_block(0, run.tile_x + 4 * block_x, run.tile_y + 4 * block_y, place, mask, nullptr,
+                                     nullptr);
             }
         }
         run.memory.passed_samples += passed;
@@ -180,8 +187,8 @@ struct Coverage {
         }
     }
 
-    /// Small triangles with one sample: 32 bits are enough for their edges, and nothing is asked about them that a few blocks would
-    /// not answer as fast.
+    /// Small triangles with one sample: 32 bits are enough for their edges, and nothing is asked about them that a few
+    /// blocks would not answer as fast.
     /// @return whether it was one
     [[gnu::always_inline]] bool draw_small() {
         const Record& record = *run.record;
@@ -194,12 +201,14 @@ struct Coverage {
         const auto greater = [](Int4 one, Int4 other) { return one > other ? one : other; };
         const auto turned = [](Int4 all) { return __builtin_shufflevector(all, all, 1, 2, 0, 1); };
         const Int4 next_x = turned(x), next_y = turned(y);
-        const std::int32_t low_x = lesser(lesser(x, next_x), turned(next_x))[0], high_x = greater(greater(x, next_x), turned(next_x))[0];
-        const std::int32_t low_y = lesser(lesser(y, next_y), turned(next_y))[0], high_y = greater(greater(y, next_y), turned(next_y))[0];
+        const std::int32_t low_x = lesser(lesser(x, next_x), turned(next_x))[0],
+                           high_x = greater(greater(x, next_x), turned(next_x))[0];
+        const std::int32_t low_y = lesser(lesser(y, next_y), turned(next_y))[0],
+                           high_y = greater(greater(y, next_y), turned(next_y))[0];
         if (high_x - low_x > 32 * subpixels || high_y - low_y > 32 * subpixels) return false;
         const DrawPlan& draw = *run.draw;
-        const auto cut = [&](std::int32_t low, std::int32_t high, std::int32_t begin, std::int32_t end, std::int32_t size,
-                             std::int32_t& first, std::int32_t& last) {
+        const auto cut = [&](std::int32_t low, std::int32_t high, std::int32_t begin, std::int32_t end,
+                             std::int32_t size, std::int32_t& first, std::int32_t& last) {
             begin = begin > 0 ? begin : 0, end = end < size ? end : size;
             first = (low + subpixels - 1) >> subpixel_bits, last = high >> subpixel_bits;
             bounded |= (first < begin) | (last >= end);
@@ -297,7 +306,8 @@ struct Coverage {
             std::uint8_t covered_samples[16] = {}, alive_samples[16] = {};
             for (std::uint32_t s = 0; s < samples; ++s)
                 for (std::uint32_t lane = 0; lane < 16; ++lane) {
-                    covered_samples[lane] = static_cast<std::uint8_t>(covered_samples[lane] | (masks[s] >> lane & 1) << s);
+                    covered_samples[lane] =
+                        static_cast<std::uint8_t>(covered_samples[lane] | (masks[s] >> lane & 1) << s);
                     alive_samples[lane] = static_cast<std::uint8_t>(alive_samples[lane] | (alive[s] >> lane & 1) << s);
                 }
             if (!draw.runs_per_sample) {
@@ -310,7 +320,8 @@ struct Coverage {
     }
 };
 
-/// Lines of one sample: the pixels whose diamond the line leaves (Vulkan specification, "Bresenham Line Segment Rasterization").
+/// Lines of one sample: the pixels whose diamond the line leaves (Vulkan specification, "Bresenham Line Segment
+/// Rasterization").
 struct ThinLine {
     Coverage<false> coverage;
     std::int32_t block_x = -1, block_y = -1;
@@ -331,7 +342,8 @@ struct ThinLine {
     }
 
     static bool in_diamond(std::int32_t x, std::int32_t y) {
-        const std::int32_t from_x = (x & (subpixels - 1)) - subpixels / 2, from_y = (y & (subpixels - 1)) - subpixels / 2;
+        const std::int32_t from_x = (x & (subpixels - 1)) - subpixels / 2,
+                           from_y = (y & (subpixels - 1)) - subpixels / 2;
         return (from_x < 0 ? -from_x : from_x) + (from_y < 0 ? -from_y : from_y) < subpixels / 2;
     }
 
@@ -350,9 +362,10 @@ struct ThinLine {
         const bool forward = length > 0;
         const std::int32_t start = major[0] >> subpixel_bits, end = major[1] >> subpixel_bits;
         const auto center = [](std::int32_t column) { return column * subpixels + subpixels / 2; };
-        // The first column also counts where the line starts behind its center but inside of the diamond; the last only where the
-        // line comes out of the diamond.
-        const bool start_inside = in_diamond(record.x[0], record.y[0]), end_inside = in_diamond(record.x[1], record.y[1]);
+        // The first column also counts where the line starts behind its center but inside of the diamond; the last only
+        // where the line comes out of the diamond.
+        const bool start_inside = in_diamond(record.x[0], record.y[0]),
+                   end_inside = in_diamond(record.x[1], record.y[1]);
         const bool start_behind = forward ? major[0] > center(start) : major[0] < center(start);
         const bool end_behind = forward ? major[1] > center(end) : major[1] < center(end);
         const std::int32_t step = forward ? 1 : -1;
@@ -363,10 +376,14 @@ struct ThinLine {
         const auto cut = [](std::int32_t value, std::int32_t low, std::int32_t high) {
             return value < low ? low : value > high ? high : value;
         };
-        const std::int32_t x_begin = cut(plan.x_begin - run.tile_x, 0, run.width), x_end = cut(plan.x_end - run.tile_x, 0, run.width);
-        const std::int32_t y_begin = cut(plan.y_begin - run.tile_y, 0, run.height), y_end = cut(plan.y_end - run.tile_y, 0, run.height);
-        const std::int32_t major_tile = along_y ? run.tile_y : run.tile_x, minor_tile = along_y ? run.tile_x : run.tile_y;
-        const std::int32_t begin = major_tile + (along_y ? y_begin : x_begin), limit = major_tile + (along_y ? y_end : x_end) - 1;
+        const std::int32_t x_begin = cut(plan.x_begin - run.tile_x, 0, run.width),
+                           x_end = cut(plan.x_end - run.tile_x, 0, run.width);
+        const std::int32_t y_begin = cut(plan.y_begin - run.tile_y, 0, run.height),
+                           y_end = cut(plan.y_end - run.tile_y, 0, run.height);
+        const std::int32_t major_tile = along_y ? run.tile_y : run.tile_x,
+                           minor_tile = along_y ? run.tile_x : run.tile_y;
+        const std::int32_t begin = major_tile + (along_y ? y_begin : x_begin),
+                           limit = major_tile + (along_y ? y_end : x_end) - 1;
         const std::int32_t from = forward ? (first > begin ? first : begin) : (first < limit ? first : limit);
         const std::int32_t to = forward ? (last < limit ? last : limit) : (last > begin ? last : begin);
         for (std::int32_t column = from; forward ? column <= to : column >= to; column += step) {
@@ -374,7 +391,8 @@ struct ThinLine {
             if (column == start && start_behind) {
                 row = minor[0] >> subpixel_bits;
             } else {
-                std::int64_t numerator = static_cast<std::int64_t>(minor[0]) * length + (center(column) - major[0]) * rise;
+                std::int64_t numerator =
+                    static_cast<std::int64_t>(minor[0]) * length + (center(column) - major[0]) * rise;
                 std::int64_t denominator = static_cast<std::int64_t>(length) * subpixels;
                 if (denominator < 0) numerator = -numerator, denominator = -denominator;
                 std::int64_t quotient = numerator / denominator;

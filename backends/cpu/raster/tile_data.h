@@ -9,22 +9,22 @@
 #include "rhi/pipeline.h"
 
 /// @file
-/// What the stages of the rasterizer hand to each other, as plain structures: the tile kernels are compiled once for each
-/// instruction set and must share no inline function with the rest of the program, or the linker could pick the copy
-/// that a smaller processor cannot run.
+/// What the stages of the rasterizer hand to each other, as plain structures: the tile kernels are compiled once for
+/// each instruction set and must share no inline function with the rest of the program, or the linker could pick the
+/// copy that a smaller processor cannot run.
 ///
 ///     draws -> chunks of primitives (vertices, set-up, bins; in parallel) -> tiles (in parallel, primitives in order)
 
 namespace nacre::cpu::raster {
 
-inline constexpr std::int32_t tile_size = 64;         ///< Pixels, both ways.
-inline constexpr std::int32_t tile_blocks = 16;       ///< Blocks of 4x4 pixels in a row of a tile.
+inline constexpr std::int32_t tile_size = 64;    ///< Pixels, both ways.
+inline constexpr std::int32_t tile_blocks = 16;  ///< Blocks of 4x4 pixels in a row of a tile.
 inline constexpr std::int32_t tile_pixels = tile_size * tile_size;
 inline constexpr std::int32_t subpixel_bits = 8;
 inline constexpr std::int32_t subpixels = 1 << subpixel_bits;
 inline constexpr std::uint32_t most_samples = 4;
-/// Window coordinates of vertices stay inside of +-this many pixels, so that edge functions inside of a tile fit 32 bits:
-/// an edge that crosses a tile changes by at most 63 * (|A| + |B|) <= 63 * 2^25 < 2^31 over it.
+/// Window coordinates of vertices stay inside of +-this many pixels, so that edge functions inside of a tile fit 32
+/// bits: an edge that crosses a tile changes by at most 63 * (|A| + |B|) <= 63 * 2^25 < 2^31 over it.
 inline constexpr float guard_band = 32767.0f;
 /// Primitives that touch more tiles than this are not sorted into bins; every tile looks at them. It bounds the bins.
 inline constexpr std::int32_t most_binned_tiles = 16;
@@ -43,12 +43,17 @@ static_assert(sizeof(ScreenVertex) == 32);
 
 /// What set-up needs of a vertex, and only set-up.
 struct SetupVertex {
-    std::int32_t x, y;     ///< Window coordinates with `subpixel_bits` bits behind the point; valid without `needs_clip`.
+    std::int32_t x, y;  ///< Window coordinates with `subpixel_bits` bits behind the point; valid without `needs_clip`.
     std::uint32_t codes;   ///< VertexCodes
     std::uint32_t offset;  ///< Of the ScreenVertex in its chunk, in units of 16 bytes.
 };
 enum VertexCodes : std::uint32_t {
-    outside_left = 1, outside_right = 2, outside_top = 4, outside_bottom = 8, outside_near = 16, outside_far = 32,
+    outside_left = 1,
+    outside_right = 2,
+    outside_top = 4,
+    outside_bottom = 8,
+    outside_near = 16,
+    outside_far = 32,
     outside_view = 63,
     outside_guard = 64,  ///< Beyond the guard band, or w <= 0.
     not_finite = 128,
@@ -67,15 +72,15 @@ enum class PlaneSource : std::uint32_t {
     point,        ///< Constant.
 };
 
-/// One triangle, line or point that may cover pixels. What it covers is the triangle of (x, y); its planes belong to the
-/// vertices, which differ from (x, y) where it was clipped.
+/// One triangle, line or point that may cover pixels. What it covers is the triangle of (x, y); its planes belong to
+/// the vertices, which differ from (x, y) where it was clipped.
 struct alignas(64) Record {
-    std::int32_t x[3], y[3];   ///< With `subpixel_bits` bits behind the point; clockwise as seen (y down). Lines: two.
-    std::uint32_t vertex[3];   ///< As SetupVertex::offset, provoking vertex first. Lines: [2] is the provoking vertex.
+    std::int32_t x[3], y[3];  ///< With `subpixel_bits` bits behind the point; clockwise as seen (y down). Lines: two.
+    std::uint32_t vertex[3];  ///< As SetupVertex::offset, provoking vertex first. Lines: [2] is the provoking vertex.
     std::uint32_t primitive_id;
-    std::uint32_t bits;        ///< See below.
+    std::uint32_t bits;  ///< See below.
     float depth_c, depth_dx, depth_dy;
-    float x0, y0;              ///< What the planes are relative to.
+    float x0, y0;  ///< What the planes are relative to.
 
     static constexpr std::uint32_t front_facing = 1, swapped = 2, thin_line = 4, source_shift = 4, draw_shift = 8;
     [[nodiscard]] PlaneSource source() const { return static_cast<PlaneSource>(bits >> source_shift & 7); }
@@ -124,11 +129,11 @@ struct DepthStencilPlan {
 };
 
 struct ColorPlan {
-    std::uint32_t target;      ///< Into TargetSet::colors.
-    std::uint32_t output;      ///< Into FragmentBatch::colors.
+    std::uint32_t target;  ///< Into TargetSet::colors.
+    std::uint32_t output;  ///< Into FragmentBatch::colors.
     std::uint32_t components;
-    bool blends, partial;      ///< `partial`: the write mask leaves channels of the format out.
-    bool as_it_is;             ///< Texels are the words of the output, without any conversion.
+    bool blends, partial;  ///< `partial`: the write mask leaves channels of the format out.
+    bool as_it_is;         ///< Texels are the words of the output, without any conversion.
     rhi::BlendState blend;
     std::uint32_t word_masks[4];  ///< Bits of a texel that are written.
 };
@@ -141,12 +146,12 @@ struct DrawPlan {
     /// For each input all bits or none, padded to a multiple of four: not divided by w; not interpolated.
     const std::int32_t* linear_masks;
     const std::int32_t* flat_masks;
-    std::uint32_t primitive_bytes;       ///< PrimitiveData with its varyings.
-    bool shades;                         ///< The fragment function runs at all.
-    bool plain_results;                  ///< Nothing but its colors comes out of it, and they overwrite what was there.
-    bool late_tests;                     ///< Depth and stencil are tested after it.
-    bool early_rejection;                ///< Depth is also tested before it, without writing.
-    bool hierarchical;                   ///< Whole regions may be rejected by depth.
+    std::uint32_t primitive_bytes;  ///< PrimitiveData with its varyings.
+    bool shades;                    ///< The fragment function runs at all.
+    bool plain_results;             ///< Nothing but its colors comes out of it, and they overwrite what was there.
+    bool late_tests;                ///< Depth and stencil are tested after it.
+    bool early_rejection;           ///< Depth is also tested before it, without writing.
+    bool hierarchical;              ///< Whole regions may be rejected by depth.
     bool discards, runs_per_sample, uses_centroid, writes_depth, writes_sample_mask, alpha_to_coverage;
     DepthStencilPlan depth_stencil;
     std::uint32_t color_count;
@@ -169,21 +174,21 @@ struct Stream {
     std::int32_t x[stream_quads + 4], y[stream_quads + 4];
     std::uint32_t live[stream_quads + 4];    ///< Pixels, 4 bits.
     std::uint32_t places[stream_quads + 4];  ///< In the tile's depth: first lane.
-    /// With several samples, for each pixel one bit for each: samples that the primitive covers, and those of them that passed the
-    /// tests so far.
+    /// With several samples, for each pixel one bit for each: samples that the primitive covers, and those of them that
+    /// passed the tests so far.
     std::uint8_t covered[stream_quads + 4][4], alive[stream_quads + 4][4];
     std::uint32_t quads;
 };
 
-/// Memory of one thread. Depth and stencil of a tile lie here as 32-bit integers that compare like the depths, in blocks
-/// of 4x4 pixels that consist of four quads: pixel (x, y) of quad (i, j) is lane 4 * (2 * j + i) + 2 * y + x.
+/// Memory of one thread. Depth and stencil of a tile lie here as 32-bit integers that compare like the depths, in
+/// blocks of 4x4 pixels that consist of four quads: pixel (x, y) of quad (i, j) is lane 4 * (2 * j + i) + 2 * y + x.
 struct alignas(64) Workspace {
     std::int32_t depth[most_samples][tile_pixels];
     std::int32_t stencil[most_samples][tile_pixels];
     Stream streams[most_samples];
     FragmentBatch batches[stream_batches];
-    std::byte* primitives;            ///< `primitive_slots` of the largest DrawPlan::primitive_bytes.
-    std::uint64_t passed_samples;     ///< Counts up.
+    std::byte* primitives;         ///< `primitive_slots` of the largest DrawPlan::primitive_bytes.
+    std::uint64_t passed_samples;  ///< Counts up.
 };
 
 struct TileJob {
@@ -197,16 +202,16 @@ struct TileJob {
 
 /// Vertices of a segment that come from one call of the vertex function.
 struct VertexFinish {
-    const float* const* rows;      ///< Sources of the words behind the ScreenVertex: arrays of max_lanes; a multiple of 4.
+    const float* const* rows;  ///< Sources of the words behind the ScreenVertex: arrays of max_lanes; a multiple of 4.
     std::uint32_t row_count;
-    std::uint32_t count;           ///< Vertices, at most max_lanes.
-    const float* outputs;          ///< VertexBatch::outputs
+    std::uint32_t count;   ///< Vertices, at most max_lanes.
+    const float* outputs;  ///< VertexBatch::outputs
     std::uint32_t clip_distances, cull_distances;
     bool depth_clamp;
     float scale[3], translation[3];
-    std::byte* vertices;           ///< Where the first ScreenVertex goes.
+    std::byte* vertices;  ///< Where the first ScreenVertex goes.
     std::uint32_t vertex_bytes;
-    std::uint32_t first_offset;    ///< SetupVertex::offset of the first.
+    std::uint32_t first_offset;  ///< SetupVertex::offset of the first.
     SetupVertex* setup;
 };
 

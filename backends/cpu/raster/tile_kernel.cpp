@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compiled once for each instruction set, with NACRE_RASTER_KERNELS as the name of the result. Nothing here may have external
-// linkage but that name, and nothing from the standard library may be called that is not inlined for certain.
+// Compiled once for each instruction set, with NACRE_RASTER_KERNELS as the name of the result. Nothing here may have
+// external linkage but that name, and nothing from the standard library may be called that is not inlined for certain.
 #include "backends/cpu/raster/tile_coverage.h"
 #include "backends/cpu/raster/vertex_lanes.h"
 
@@ -34,7 +34,8 @@ struct Queue {
         for (std::uint32_t i = 0; i < count; ++i) {
             if (i + ahead < count && run.draw && run.draw->shades)
                 for (int corner = 0; corner < 3; ++corner)
-                    __builtin_prefetch(vertices[i + ahead] + static_cast<std::size_t>(records[i + ahead]->vertex[corner]) * 16);
+                    __builtin_prefetch(vertices[i + ahead] +
+                                       static_cast<std::size_t>(records[i + ahead]->vertex[corner]) * 16);
             draw_record(run, *records[i], vertices[i]);
         }
         count = 0;
@@ -48,7 +49,8 @@ void draw_tile(const TileJob& job, std::uint32_t tile, Workspace& workspace) {
         const ChunkView& chunk = job.chunks[i];
         const std::uint32_t* bin = nullptr;
         const std::uint32_t* bin_end = nullptr;
-        if (chunk.bin_offsets) bin = chunk.bins + chunk.bin_offsets[tile], bin_end = chunk.bins + chunk.bin_offsets[tile + 1];
+        if (chunk.bin_offsets)
+            bin = chunk.bins + chunk.bin_offsets[tile], bin_end = chunk.bins + chunk.bin_offsets[tile + 1];
         const std::uint32_t* large = chunk.large;
         const std::uint32_t* const large_end = large + chunk.large_count;
         while (bin != bin_end || large != large_end) {

@@ -15,8 +15,8 @@ struct QuadRows {
     std::byte* top[4];  ///< Texel 0; texel 2 lies one row below.
 };
 
-NACRE_LANES_INLINE void store_quad(std::byte* top, std::uint32_t row_stride, std::uint32_t texel_bytes, std::uint32_t live,
-                                   const std::uint32_t (*words)[16], std::uint32_t lane) {
+NACRE_LANES_INLINE void store_quad(std::byte* top, std::uint32_t row_stride, std::uint32_t texel_bytes,
+                                   std::uint32_t live, const std::uint32_t (*words)[16], std::uint32_t lane) {
     for (std::uint32_t row = 0; row < 2; ++row) {
         std::byte* const texel = top + row * static_cast<std::size_t>(row_stride);
         const std::uint32_t first = lane + 2 * row;
@@ -64,8 +64,8 @@ inline void load_quad(const std::byte* top, std::uint32_t row_stride, std::uint3
     }
 }
 
-/// Texels of 32 bits of a batch whose quads lie inside of the target. Pixels that do not count are written back as they were: no
-/// other thread touches the tile, and a branch for each of them would cost more.
+/// Texels of 32 bits of a batch whose quads lie inside of the target. Pixels that do not count are written back as they
+/// were: no other thread touches the tile, and a branch for each of them would cost more.
 /// @param keep  all bits in lanes that do not count
 inline void store_words(const QuadRows& rows, std::uint32_t row_stride, std::uint32_t quads, const std::uint32_t* words,
                         const std::uint32_t* keep) {
@@ -147,14 +147,15 @@ NACRE_LANES_INLINE Floats in_target_range(rhi::FormatKind kind, const Floats& va
     return value;
 }
 
-inline void load_channels(const FragmentBatch& batch, std::uint32_t output, std::uint32_t components, Ints (&channels)[4]) {
+inline void load_channels(const FragmentBatch& batch, std::uint32_t output, std::uint32_t components,
+                          Ints (&channels)[4]) {
     for (std::uint32_t i = 0; i < 4; ++i)
         channels[i] = i < components ? load(batch.colors[output][i]) : ints(i == 3 ? 0x3f800000 : 0);
 }
 
 /// Packs the colors of `plan` for lanes where the target's own texels do not matter.
-inline void pack_colors(const ColorPlan& plan, const ColorTarget& target, const SrgbTables& srgb, const FragmentBatch& batch,
-                        std::uint32_t (&words)[4][16]) {
+inline void pack_colors(const ColorPlan& plan, const ColorTarget& target, const SrgbTables& srgb,
+                        const FragmentBatch& batch, std::uint32_t (&words)[4][16]) {
     Ints channels[4], packed[4];
     load_channels(batch, plan.output, plan.components, channels);
     encode_texels(target.format, srgb, channels, packed);
@@ -162,7 +163,8 @@ inline void pack_colors(const ColorPlan& plan, const ColorTarget& target, const 
     for (std::uint32_t i = 0; i < count; ++i) store(words[i], packed[i]);
 }
 
-/// Colors of `plan` for the lanes in `live`, over what the target holds: read, blended, masked. No two lanes are the same pixel.
+/// Colors of `plan` for the lanes in `live`, over what the target holds: read, blended, masked. No two lanes are the
+/// same pixel.
 inline void blend_colors(const DrawPlan& draw, const ColorPlan& plan, const ColorTarget& target, const SrgbTables& srgb,
                          const FragmentBatch& batch, const QuadRows& rows, std::uint32_t live,
                          std::uint32_t (&words)[4][16]) {
@@ -187,8 +189,8 @@ inline void blend_colors(const DrawPlan& draw, const ColorPlan& plan, const Colo
         }
         const rhi::BlendState& blend = plan.blend;
         for (int i = 0; i < 3; ++i)
-            channels[i] = bits_of(
-                blend_channel(blend.color_operation, blend.source_color, blend.destination_color, inputs, i));
+            channels[i] =
+                bits_of(blend_channel(blend.color_operation, blend.source_color, blend.destination_color, inputs, i));
         channels[3] =
             bits_of(blend_channel(blend.alpha_operation, blend.source_alpha, blend.destination_alpha, inputs, 3));
     }

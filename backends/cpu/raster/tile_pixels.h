@@ -75,8 +75,8 @@ inline void store_pixels(std::byte* to, std::uint32_t row_stride, std::int32_t w
         }
 }
 
-/// Depth as the integer that the target holds; integers compare like the depths. Floats that are not negative compare like
-/// their bits. `low` and `high` are the range of depth clamp, or 0 and 1.
+/// Depth as the integer that the target holds; integers compare like the depths. Floats that are not negative compare
+/// like their bits. `low` and `high` are the range of depth clamp, or 0 and 1.
 NACRE_LANES_INLINE Ints depth_key(DepthLayout layout, const Floats& depth, float low, float high) {
     const Floats bounded = clamp(depth, low, high);
     switch (layout) {
@@ -123,8 +123,8 @@ inline Ints apply_stencil_operation(rhi::StencilOperation operation, const Ints&
     }
 }
 
-/// Stencil and depth test of the lanes in `mask`, all facing the same way; changes `depth` and `stencil` of those lanes as the
-/// draw says. A null pointer: there is no such target, the test passes.
+/// Stencil and depth test of the lanes in `mask`, all facing the same way; changes `depth` and `stencil` of those lanes
+/// as the draw says. A null pointer: there is no such target, the test passes.
 /// @return lanes that passed
 inline std::uint32_t test_lanes(const DepthStencilPlan& plan, bool front, const Ints& key, std::uint32_t mask,
                                 std::int32_t* depth, std::int32_t* stencil) {
@@ -135,8 +135,8 @@ inline std::uint32_t test_lanes(const DepthStencilPlan& plan, bool front, const 
     Ints stencil_value = ints(0);
     if (tests_stencil) {
         stencil_value = load(stencil);
-        passed_stencil = asked & compare(face.compare, ints(plan.reference & face.read_mask),
-                                         stencil_value & ints(face.read_mask));
+        passed_stencil =
+            asked & compare(face.compare, ints(plan.reference & face.read_mask), stencil_value & ints(face.read_mask));
     }
     Lanes passed = passed_stencil;
     if (plan.depth_test && depth) {
@@ -146,7 +146,8 @@ inline std::uint32_t test_lanes(const DepthStencilPlan& plan, bool front, const 
     }
     if (tests_stencil && face.write_mask != 0) {
         Ints changed = apply_stencil_operation(face.fail, stencil_value, plan.reference);
-        changed = select(passed_stencil, apply_stencil_operation(face.depth_fail, stencil_value, plan.reference), changed);
+        changed =
+            select(passed_stencil, apply_stencil_operation(face.depth_fail, stencil_value, plan.reference), changed);
         changed = select(passed, apply_stencil_operation(face.pass, stencil_value, plan.reference), changed);
         changed = select(asked, changed, stencil_value);
         const Ints written = ints(face.write_mask);

@@ -6,7 +6,8 @@
 #include "backends/cpu/raster/tile_pixels.h"
 
 /// @file
-/// One tile: its pixels, what waits for the fragment function, and what becomes of its results. Internal linkage, as in simd.h.
+/// One tile: its pixels, what waits for the fragment function, and what becomes of its results. Internal linkage, as in
+/// simd.h.
 
 namespace nacre::cpu::raster {
 namespace {
@@ -32,10 +33,10 @@ struct TileRun {
     const DrawPlan* draw = nullptr;
     std::uint32_t draw_index = ~0u;
     bool depth_loaded = false, depth_changed = false, stencil_loaded = false, stencil_changed = false;
-    std::int32_t* depth = nullptr;    ///< Where the draw tests depth.
+    std::int32_t* depth = nullptr;  ///< Where the draw tests depth.
     std::int32_t* stencil = nullptr;
     float depth_low = 0.0f, depth_high = 1.0f;
-    bool simple_depth = false;        ///< See Coverage::run_simple_blocks.
+    bool simple_depth = false;                        ///< See Coverage::run_simple_blocks.
     bool lowers_depth = false, raises_depth = false;  ///< What the draw writes may leave the bounds of a region there.
 
     // The record that is drawn.
@@ -95,11 +96,11 @@ struct TileRun {
                 std::byte* const to = targets.depth + sample * targets.depth_sample_stride +
                                       static_cast<std::size_t>(tile_y) * targets.depth_row_stride;
                 if (targets.depth_layout == DepthLayout::unorm16)
-                    store_pixels<std::uint16_t>(to + static_cast<std::size_t>(tile_x) * 2, targets.depth_row_stride, width,
-                                                height, memory.depth[sample]);
+                    store_pixels<std::uint16_t>(to + static_cast<std::size_t>(tile_x) * 2, targets.depth_row_stride,
+                                                width, height, memory.depth[sample]);
                 else
-                    store_pixels<std::uint32_t>(to + static_cast<std::size_t>(tile_x) * 4, targets.depth_row_stride, width,
-                                                height, memory.depth[sample]);
+                    store_pixels<std::uint32_t>(to + static_cast<std::size_t>(tile_x) * 4, targets.depth_row_stride,
+                                                width, height, memory.depth[sample]);
             }
             if (stencil_changed)
                 store_pixels<std::uint8_t>(targets.stencil + sample * targets.stencil_sample_stride +
@@ -132,7 +133,8 @@ struct TileRun {
 
     // ---- Depth ---------------------------------------------------------------------------------------------------
 
-    /// The one formula of depth. Its sums are in this order everywhere: depths of one triangle must be equal whatever draws it.
+    /// The one formula of depth. Its sums are in this order everywhere: depths of one triangle must be equal whatever
+    /// draws it.
     [[gnu::always_inline]] Floats depth_at(const Floats& x, const Floats& y) const {
         return floats(record->depth_c) + floats(record->depth_dx) * (x - floats(record->x0)) +
                floats(record->depth_dy) * (y - floats(record->y0));
@@ -173,9 +175,9 @@ struct TileRun {
         region_low[region] = least, region_high[region] = most, region_writes[region] = 0;
     }
 
-    /// Whether no sample of the record in pixels [x0, x1] x [y0, y1] of the tile, all in one region, passes the depth test.
-    /// Floating-point addition and multiplication keep order, so the formula of depth is largest and smallest in the corners,
-    /// bit for bit.
+    /// Whether no sample of the record in pixels [x0, x1] x [y0, y1] of the tile, all in one region, passes the depth
+    /// test. Floating-point addition and multiplication keep order, so the formula of depth is largest and smallest in
+    /// the corners, bit for bit.
     bool hidden(std::int32_t region_x, std::int32_t region_y, std::int32_t x0, std::int32_t x1, std::int32_t y0,
                 std::int32_t y1) {
         const std::int32_t region = region_y * regions_across + region_x;
@@ -216,8 +218,8 @@ struct TileRun {
         return *primitive;
     }
 
-    /// Asks for the lines of the color targets in a region that is drawn to for the first time, and in the one behind it, which
-    /// is likely to follow: stores would wait for them one after another otherwise.
+    /// Asks for the lines of the color targets in a region that is drawn to for the first time, and in the one behind
+    /// it, which is likely to follow: stores would wait for them one after another otherwise.
     [[gnu::noinline]] void enter_region(std::uint32_t region) {
         entered_regions |= 1u << region;
         if (targets.samples > 1) return;
@@ -233,7 +235,8 @@ struct TileRun {
                 const std::byte* line = target.data + static_cast<std::size_t>(tile_y + y) * target.row_stride +
                                         static_cast<std::size_t>(tile_x + x) * target.texel_bytes;
                 for (std::int32_t row = 0; row < rows; ++row, line += target.row_stride)
-                    for (std::uint32_t byte = 0; byte < 16 * target.texel_bytes; byte += 64) __builtin_prefetch(line + byte, 1);
+                    for (std::uint32_t byte = 0; byte < 16 * target.texel_bytes; byte += 64)
+                        __builtin_prefetch(line + byte, 1);
             }
         }
     }
@@ -242,8 +245,9 @@ struct TileRun {
     /// @param live     pixels, 16 bits
     /// @param covered  for each pixel the samples that the primitive covers; null with one sample
     /// @param alive    and those that passed the tests so far
-    [[gnu::always_inline]] void append_block(std::uint32_t stream_index, std::int32_t x, std::int32_t y, std::uint32_t place,
-                                             std::uint32_t live, const std::uint8_t* covered, const std::uint8_t* alive) {
+    [[gnu::always_inline]] void append_block(std::uint32_t stream_index, std::int32_t x, std::int32_t y,
+                                             std::uint32_t place, std::uint32_t live, const std::uint8_t* covered,
+                                             const std::uint8_t* alive) {
         Stream& stream = memory.streams[stream_index];
         if (stream.quads + 4 > stream_quads) flush_stream(stream_index);
         const std::uint32_t region = (place >> 10) * regions_across + (place >> 6 & 3);
@@ -282,7 +286,8 @@ struct TileRun {
             stream.live[quad] = 0;
             std::memset(stream.covered[quad], 0, 4), std::memset(stream.alive[quad], 0, 4);
         }
-        for (std::uint32_t i = 0; i < count; ++i) fill_batch(memory.batches[i], stream, stream_index, i * quads_in_batch, quads_in_batch);
+        for (std::uint32_t i = 0; i < count; ++i)
+            fill_batch(memory.batches[i], stream, stream_index, i * quads_in_batch, quads_in_batch);
         draw->fragment(draw->context, memory.batches, count);
         for (std::uint32_t i = 0; i < count; ++i) {
             if (draw->plain_results)
@@ -306,7 +311,8 @@ struct TileRun {
         batch.sample_x = single ? static_cast<float>(sample_offset_x[stream_index]) / subpixels : 0.5f;
         batch.sample_y = single ? static_cast<float>(sample_offset_y[stream_index]) / subpixels : 0.5f;
         store(batch.sample_mask_in, ints(single ? 1 << stream_index : 1));
-        if (draw->uses_centroid) store(batch.centroid_x, floats(batch.sample_x)), store(batch.centroid_y, floats(batch.sample_y));
+        if (draw->uses_centroid)
+            store(batch.centroid_x, floats(batch.sample_x)), store(batch.centroid_y, floats(batch.sample_y));
         if (targets.samples == 1 || single) return;
         for (std::uint32_t lane = 0; lane < 4 * quads; ++lane) {
             const std::uint32_t bits = stream.covered[first + lane / 4][lane & 3];
@@ -325,8 +331,7 @@ struct TileRun {
         const std::uint32_t live = batch.live;
         // Quads of unfilled batches repeat others, without a live pixel.
         bool inside = width % 2 == 0 && height % 2 == 0, block = quads == 4 && live == 0xffff && places[0] % 16 == 0;
-        for (std::uint32_t quad = 0; quad < quads; ++quad)
-            block = block && places[quad] == places[0] + 4 * quad;
+        for (std::uint32_t quad = 0; quad < quads; ++quad) block = block && places[quad] == places[0] + 4 * quad;
         alignas(64) std::uint32_t keep[16];
         store(keep, select(lanes_of(live), ints(0), ints(-1)));
         std::size_t offsets[4] = {};
@@ -398,11 +403,12 @@ struct TileRun {
             any |= mask;
         }
         if (any == 0) return;
-        for (std::uint32_t i = 0; i < draw->color_count; ++i) write_color(draw->colors[i], batch, masks, first, end, conflict);
+        for (std::uint32_t i = 0; i < draw->color_count; ++i)
+            write_color(draw->colors[i], batch, masks, first, end, conflict);
     }
 
-    std::uint32_t late_test(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t sample, std::uint32_t mask,
-                            bool one_by_one, std::uint32_t quads) {
+    std::uint32_t late_test(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t sample,
+                            std::uint32_t mask, bool one_by_one, std::uint32_t quads) {
         if (!depth && !stencil) return mask;
         Ints key = ints(0);
         if (depth) {
@@ -410,13 +416,16 @@ struct TileRun {
             if (draw->writes_depth) {
                 std::memcpy(z, batch.depth, sizeof(z));
             } else {
-                const float offset_x = targets.samples == 1 ? 0.5f : static_cast<float>(sample_offset_x[sample]) / subpixels;
-                const float offset_y = targets.samples == 1 ? 0.5f : static_cast<float>(sample_offset_y[sample]) / subpixels;
+                const float offset_x =
+                    targets.samples == 1 ? 0.5f : static_cast<float>(sample_offset_x[sample]) / subpixels;
+                const float offset_y =
+                    targets.samples == 1 ? 0.5f : static_cast<float>(sample_offset_y[sample]) / subpixels;
                 for (std::uint32_t lane = 0; lane < 16; ++lane) {
                     const PrimitiveData& from = *batch.primitives[lane / 4 < quads ? lane / 4 : 0];
                     const std::uint32_t quad = lane / 4 < quads ? lane / 4 : 0;
                     const float x = static_cast<float>(batch.x[quad] + static_cast<std::int32_t>(lane & 1)) + offset_x;
-                    const float y = static_cast<float>(batch.y[quad] + static_cast<std::int32_t>(lane >> 1 & 1)) + offset_y;
+                    const float y =
+                        static_cast<float>(batch.y[quad] + static_cast<std::int32_t>(lane >> 1 & 1)) + offset_y;
                     z[lane] = from.depth.c + from.depth.dx * (x - from.x0) + from.depth.dy * (y - from.y0);
                 }
             }
@@ -429,8 +438,8 @@ struct TileRun {
                 if (stencil) std::memcpy(stencils + 4 * quad, memory.stencil[sample] + places[quad], 16);
             }
             const bool faces_front = batch.primitives[first]->front_facing != 0;
-            const std::uint32_t passed = test_lanes(draw->depth_stencil, faces_front, key, asked, depth ? depths : nullptr,
-                                                    stencil ? stencils : nullptr);
+            const std::uint32_t passed = test_lanes(draw->depth_stencil, faces_front, key, asked,
+                                                    depth ? depths : nullptr, stencil ? stencils : nullptr);
             for (std::uint32_t quad = first; quad < end && quad < max_quads; ++quad) {
                 if (depth && draw->depth_stencil.depth_write && (passed >> (4 * quad) & 15) != 0) {
                     std::memcpy(memory.depth[sample] + places[quad], depths + 4 * quad, 16);

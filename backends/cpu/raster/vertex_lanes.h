@@ -28,7 +28,8 @@ inline void finish_vertices(const VertexFinish& finish) {
     Ints codes = code(less(x, zero - w), outside_left) | code(less(w, x), outside_right) |
                  code(less(y, zero - w), outside_top) | code(less(w, y), outside_bottom);
     if (!finish.depth_clamp) codes = codes | code(less(z, zero), outside_near) | code(less(w, z), outside_far);
-    const Lanes inside_guard = less(zero, w) & less(absolute(window_x), guard_band) & less(absolute(window_y), guard_band);
+    const Lanes inside_guard =
+        less(zero, w) & less(absolute(window_x), guard_band) & less(absolute(window_y), guard_band);
     codes = codes | code(~inside_guard, outside_guard);
     const Floats limit = floats(__builtin_inff());
     const Lanes finite =

@@ -95,7 +95,8 @@ void run_vertices(const Segment& segment, const QueuedDraw& draw, const Kernels&
 
     const std::uint32_t output_slots = std::max(program.output_slots, first_user_slot);
     const std::size_t batch_words = static_cast<std::size_t>(output_slots) * max_lanes;
-    // Lanes that the vertex function does not write are read, though nothing follows from them: they hold some number at least.
+    // Lanes that the vertex function does not write are read, though nothing follows from them: they hold some number
+    // at least.
     if (scratch.outputs.reserve(batches_at_once * batch_words * sizeof(float), 0))
         std::memset(scratch.outputs.data(), 0, batches_at_once * batch_words * sizeof(float));
     auto* const outputs = reinterpret_cast<float*>(scratch.outputs.data());
@@ -139,7 +140,8 @@ void run_vertices(const Segment& segment, const QueuedDraw& draw, const Kernels&
             finish.setup = scratch.setup.data() + done;
             kernels.finish_vertices(finish);
             if (is_points && program.writes_point_size)
-                std::copy_n(batch.outputs + slot_point_size * max_lanes, batch.count, scratch.point_sizes.begin() + done);
+                std::copy_n(batch.outputs + slot_point_size * max_lanes, batch.count,
+                            scratch.point_sizes.begin() + done);
             for (std::uint32_t distance = 0; distance < program.clip_distances; ++distance)
                 for (std::uint32_t lane = 0; lane < batch.count; ++lane)
                     scratch.clip_distances[(done + lane) * 8 + distance] =

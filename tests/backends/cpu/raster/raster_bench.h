@@ -83,7 +83,8 @@ class TestImage {
     }
     template <typename T>
     void fill(T value) {
-        for (std::size_t i = margin; i + margin < data_.size(); i += sizeof(T)) std::memcpy(data_.data() + i, &value, sizeof(T));
+        for (std::size_t i = margin; i + margin < data_.size(); i += sizeof(T))
+            std::memcpy(data_.data() + i, &value, sizeof(T));
     }
     void fill_stencil(std::uint8_t value) {
         std::fill(stencil_.begin() + margin, stencil_.end() - margin, static_cast<std::byte>(value));
@@ -145,7 +146,9 @@ void vertex_function(const cpu::ShaderContext*, const cpu::VertexDraw* draw, cpu
                 std::memcpy(&vertex, draw->buffers[0].data + offset, sizeof(vertex));
             // Instances lie beside each other.
             vertex.position[0] += 2.0f * static_cast<float>(batch.instance) * vertex.position[3];
-            const auto put = [&](std::uint32_t slot, float value) { batch.outputs[slot * cpu::max_lanes + lane] = value; };
+            const auto put = [&](std::uint32_t slot, float value) {
+                batch.outputs[slot * cpu::max_lanes + lane] = value;
+            };
             for (std::uint32_t i = 0; i < 4; ++i) put(cpu::slot_position + i, vertex.position[i]);
             put(cpu::slot_point_size, vertex.point_size);
             // Whoever asks for one clip distance and one cull distance finds them one behind the other.
@@ -172,7 +175,8 @@ void fragment_function(const cpu::ShaderContext* context, cpu::FragmentBatch* ba
         for (int lane = 0; lane < lanes; ++lane) {
             const cpu::PrimitiveData& primitive = *batch.primitives[lane / 4];
             const std::int32_t pixel_x = batch.x[lane / 4] + (lane & 1), pixel_y = batch.y[lane / 4] + (lane >> 1 & 1);
-            const float x = static_cast<float>(pixel_x) + batch.sample_x, y = static_cast<float>(pixel_y) + batch.sample_y;
+            const float x = static_cast<float>(pixel_x) + batch.sample_x,
+                        y = static_cast<float>(pixel_y) + batch.sample_y;
             const bool live = batch.live >> lane & 1;
             if (live && constants.counters)
                 ++reinterpret_cast<std::atomic<std::uint32_t>&>(
@@ -203,9 +207,11 @@ void fragment_function(const cpu::ShaderContext* context, cpu::FragmentBatch* ba
             } else if constexpr (shader == TestShader::coverage) {
                 colors[0][0][lane] = batch.sample_mask_in[lane];
                 colors[0][1][lane] = batch.sample_index;
-                colors[0][2][lane] = bits_of(batch.centroid_x[lane]), colors[0][3][lane] = bits_of(batch.centroid_y[lane]);
+                colors[0][2][lane] = bits_of(batch.centroid_x[lane]),
+                colors[0][3][lane] = bits_of(batch.centroid_y[lane]);
             }
-            if (constants.discard_modulus && (pixel_x + pixel_y) % static_cast<std::int32_t>(constants.discard_modulus) == 0)
+            if (constants.discard_modulus &&
+                (pixel_x + pixel_y) % static_cast<std::int32_t>(constants.discard_modulus) == 0)
                 batch.live &= ~(1u << lane);
             batch.depth[lane] = constants.depth;
             batch.sample_mask_out[lane] = constants.sample_mask;
@@ -294,7 +300,8 @@ class Bench {
     std::vector<std::unique_ptr<Kept>> kept_;
 };
 
-/// A vertex at window coordinates of a target of that size; exact for multiples of 1/256 and sizes that are powers of two.
+/// A vertex at window coordinates of a target of that size; exact for multiples of 1/256 and sizes that are powers of
+/// two.
 inline TestVertex at_window(double x, double y, std::uint32_t width, std::uint32_t height, float z = 0.5f) {
     TestVertex vertex;
     vertex.position[0] = static_cast<float>(x / (width * 0.5) - 1.0);

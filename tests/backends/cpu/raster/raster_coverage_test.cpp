@@ -82,7 +82,8 @@ TEST_P(Coverage, RandomTrianglesCoverWhatExactEdgesSay) {
                 int expected = 0;
                 for (std::size_t i = 0; i < points.size(); i += 3)
                     expected += covers(points[i], points[i + 1], points[i + 2], {x * 256 + 128, y * 256 + 128});
-                ASSERT_EQ(counted.image.at<float>(x, y), static_cast<float>(expected)) << round << ": " << x << ", " << y;
+                ASSERT_EQ(counted.image.at<float>(x, y), static_cast<float>(expected))
+                    << round << ": " << x << ", " << y;
             }
         EXPECT_TRUE(counted.image.margins_are_whole());
     }
@@ -91,12 +92,15 @@ TEST_P(Coverage, RandomTrianglesCoverWhatExactEdgesSay) {
 TEST_P(Coverage, MeshesCoverEveryPixelOnce) {
     std::mt19937 random(11);
     for (const int cells : {1, 3, 17, 90}) {
-        // A grid over the whole picture with its inner corners moved about, by less than a quarter so that nothing folds.
+        // A grid over the whole picture with its inner corners moved about, by less than a quarter so that nothing
+        // folds.
         std::vector<Point> corners;
         for (int y = 0; y <= cells; ++y)
             for (int x = 0; x <= cells; ++x) {
-                Point corner{static_cast<std::int64_t>(width) * 256 * x / cells, static_cast<std::int64_t>(height) * 256 * y / cells};
-                const int move_x = static_cast<int>(width) * 256 / cells / 5 + 1, move_y = static_cast<int>(height) * 256 / cells / 5 + 1;
+                Point corner{static_cast<std::int64_t>(width) * 256 * x / cells,
+                             static_cast<std::int64_t>(height) * 256 * y / cells};
+                const int move_x = static_cast<int>(width) * 256 / cells / 5 + 1,
+                          move_y = static_cast<int>(height) * 256 / cells / 5 + 1;
                 if (x > 0 && x < cells) corner.x += static_cast<int>(random() % (2 * move_x)) - move_x;
                 if (y > 0 && y < cells) corner.y += static_cast<int>(random() % (2 * move_y)) - move_y;
                 corners.push_back(corner);

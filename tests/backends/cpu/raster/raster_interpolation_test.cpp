@@ -5,8 +5,8 @@
 namespace nacre::test {
 namespace {
 
-using rhi::Format;
 using cpu::Interpolation;
+using rhi::Format;
 
 constexpr std::uint32_t width = 128, height = 128;
 
@@ -14,7 +14,8 @@ struct Texel4 {
     float v[4];
 };
 
-/// Weights of the three vertices at a place in clip space (x / w, y / w), in double: the exact answer for triangles behind the eye too.
+/// Weights of the three vertices at a place in clip space (x / w, y / w), in double: the exact answer for triangles
+/// behind the eye too.
 struct Exact {
     double weights[3];  ///< Perspective weights, sum 1.
     double inverse_w, depth;
@@ -23,7 +24,8 @@ struct Exact {
 Exact exact_at(const TestVertex* vertices, double pixel_x, double pixel_y) {
     const double x = pixel_x / (width * 0.5) - 1.0, y = pixel_y / (height * 0.5) - 1.0;
     double m[3][3];
-    for (int i = 0; i < 3; ++i) m[i][0] = vertices[i].position[0], m[i][1] = vertices[i].position[1], m[i][2] = vertices[i].position[3];
+    for (int i = 0; i < 3; ++i)
+        m[i][0] = vertices[i].position[0], m[i][1] = vertices[i].position[1], m[i][2] = vertices[i].position[3];
     const auto minor = [&](int i, int j) {
         const int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
         return m[a][c] * m[b][d] - m[a][d] * m[b][c];
@@ -86,7 +88,8 @@ TEST(Interpolation, PlanesAreThoseOfDoublePrecision) {
         double window[3][2];
         for (int i = 0; i < 3; ++i)
             for (int axis = 0; axis < 2; ++axis)
-                window[i][axis] = (vertices[i].position[axis] / static_cast<double>(vertices[i].position[3]) + 1.0) * 64.0;
+                window[i][axis] =
+                    (vertices[i].position[axis] / static_cast<double>(vertices[i].position[3]) + 1.0) * 64.0;
         const double area = (window[1][0] - window[0][0]) * (window[2][1] - window[0][1]) -
                             (window[2][0] - window[0][0]) * (window[1][1] - window[0][1]);
         // Slivers lose digits in proportion to their thinness.
@@ -103,8 +106,12 @@ TEST(Interpolation, PlanesAreThoseOfDoublePrecision) {
                 if (value.v[0] == -100.0f || !exact.inside) continue;
                 double perspective[2] = {}, linear = 0.0;
                 double weights[3];
-                weights[1] = ((px - window[0][0]) * (window[2][1] - window[0][1]) - (window[2][0] - window[0][0]) * (py - window[0][1])) / area;
-                weights[2] = ((window[1][0] - window[0][0]) * (py - window[0][1]) - (px - window[0][0]) * (window[1][1] - window[0][1])) / area;
+                weights[1] = ((px - window[0][0]) * (window[2][1] - window[0][1]) -
+                              (window[2][0] - window[0][0]) * (py - window[0][1])) /
+                             area;
+                weights[2] = ((window[1][0] - window[0][0]) * (py - window[0][1]) -
+                              (px - window[0][0]) * (window[1][1] - window[0][1])) /
+                             area;
                 weights[0] = 1.0 - weights[1] - weights[2];
                 for (int i = 0; i < 3; ++i) {
                     perspective[0] += exact.weights[i] * vertices[i].values[0];
@@ -144,16 +151,19 @@ TEST(Interpolation, ClippedTrianglesAreThoseOfDoublePrecision) {
                 const double px = x + 0.5, py = y + 0.5;
                 const Exact exact = exact_at(vertices.data(), px, py);
                 // Steep depths may pass the near or far plane within the rounding of corners.
-                const Exact beside[2] = {exact_at(vertices.data(), px + 0.03, py + 0.03), exact_at(vertices.data(), px - 0.03, py - 0.03)};
+                const Exact beside[2] = {exact_at(vertices.data(), px + 0.03, py + 0.03),
+                                         exact_at(vertices.data(), px - 0.03, py - 0.03)};
                 const auto in_depth = [](const Exact& at) { return at.depth >= 0.0 && at.depth <= 1.0; };
-                if (near_edge(vertices.data(), px, py) || in_depth(beside[0]) != in_depth(exact) || in_depth(beside[1]) != in_depth(exact))
+                if (near_edge(vertices.data(), px, py) || in_depth(beside[0]) != in_depth(exact) ||
+                    in_depth(beside[1]) != in_depth(exact))
                     continue;
                 ASSERT_EQ(place.v[0] != -100.0f, exact.inside && in_depth(exact)) << round << ": " << x << ", " << y;
                 if (place.v[0] == -100.0f) continue;
                 ++covered;
                 const double slope = std::abs(beside[0].depth - beside[1].depth);
                 ASSERT_NEAR(place.v[2], exact.depth, 1e-5 + 1e-4 * slope) << round;
-                ASSERT_NEAR(place.v[3], exact.inverse_w, 1e-5 * std::max(1.0, std::abs(exact.inverse_w) * 100)) << round;
+                ASSERT_NEAR(place.v[3], exact.inverse_w, 1e-5 * std::max(1.0, std::abs(exact.inverse_w) * 100))
+                    << round;
             }
     }
     EXPECT_GT(covered, 40'000u);
@@ -177,7 +187,8 @@ TEST(Interpolation, UserClipDistancesCutTriangles) {
         bench.end();
         for (std::uint32_t y = 0; y < height; ++y)
             for (std::uint32_t x = 0; x < width; ++x)
-                ASSERT_EQ(image.at<std::uint32_t>(x, y), ((distances < 1 || x < 40) && (distances < 2 || y < 96)) ? 1u : 0u)
+                ASSERT_EQ(image.at<std::uint32_t>(x, y),
+                          ((distances < 1 || x < 40) && (distances < 2 || y < 96)) ? 1u : 0u)
                     << distances << ": " << x << ", " << y;
     }
 }
@@ -199,7 +210,8 @@ TEST(Interpolation, CullDistancesDropTrianglesThatAreOutsideAsAWhole) {
 }
 
 TEST(Interpolation, SecondPassFindsEqualDepths) {
-    // A depth prepass and a second pass with another pipeline: planes, clip distances, lane counts and instruction sets differ.
+    // A depth prepass and a second pass with another pipeline: planes, clip distances, lane counts and instruction sets
+    // differ.
     std::mt19937 random(8);
     for (const Format format : {Format::d32_float, Format::d24_unorm_s8_uint, Format::d16_unorm}) {
         for (int round = 0; round < 30; ++round) {
@@ -288,7 +300,8 @@ TEST(Interpolation, DepthClampKeepsWhatNearAndFarWouldCut) {
         bench.pipeline.depth_stencil.depth_compare = rhi::CompareOperation::always;
         bench.pipeline.depth_stencil.depth_clamp = clamps;
         // Depth runs from -1 at x = 0 to 2 at x = 128, without perspective.
-        std::vector<TestVertex> vertices = {at_window(0, 0, width, height, -1.0f), at_window(256, 0, width, height, 5.0f),
+        std::vector<TestVertex> vertices = {at_window(0, 0, width, height, -1.0f),
+                                            at_window(256, 0, width, height, 5.0f),
                                             at_window(0, 256, width, height, -1.0f)};
         bench.draw(vertices);
         bench.end();
@@ -313,7 +326,8 @@ TEST(Interpolation, DepthBiasIsThatOfTheSpecification) {
                     state.depth_compare = rhi::CompareOperation::always;
                     state.depth_bias = constant, state.depth_bias_slope = slope, state.depth_bias_clamp = clamp;
                     // 0.25 to 0.75 over 128 pixels: the largest depth of the triangle is 1.25, with an exponent of 0.
-                    std::vector<TestVertex> vertices = {at_window(0, 0, width, height, 0.25f), at_window(128, 0, width, height, 0.75f),
+                    std::vector<TestVertex> vertices = {at_window(0, 0, width, height, 0.25f),
+                                                        at_window(128, 0, width, height, 0.75f),
                                                         at_window(0, 128, width, height, 0.25f)};
                     bench.draw(vertices);
                     bench.end();

@@ -12,7 +12,8 @@ constexpr std::uint32_t width = 70, height = 10;  // Two tiles, the second with 
 std::vector<TestVertex> everything(float z = 0.5f) {
     std::vector<TestVertex> vertices(3);
     const float corners[3][2] = {{-1, -1}, {3, -1}, {-1, 3}};
-    for (int i = 0; i < 3; ++i) vertices[i].position[0] = corners[i][0], vertices[i].position[1] = corners[i][1], vertices[i].position[2] = z;
+    for (int i = 0; i < 3; ++i)
+        vertices[i].position[0] = corners[i][0], vertices[i].position[1] = corners[i][1], vertices[i].position[2] = z;
     return vertices;
 }
 
@@ -46,7 +47,8 @@ int changed(StencilOperation operation, int value, int reference) {
 TEST(Output, DepthAndStencilFollowTheFormulas) {
     std::mt19937 random(3);
     for (int round = 0; round < 400; ++round) {
-        const Format formats[] = {Format::d16_unorm, Format::d24_unorm_s8_uint, Format::d32_float, Format::d32_float_s8_uint};
+        const Format formats[] = {Format::d16_unorm, Format::d24_unorm_s8_uint, Format::d32_float,
+                                  Format::d32_float_s8_uint};
         const Format format = formats[random() % 4];
         const bool has_stencil = info(format).has_stencil;
         TestImage depth(format, width, height), color(Format::r32_float, width, height);
@@ -60,7 +62,8 @@ TEST(Output, DepthAndStencilFollowTheFormulas) {
                     depth.at<std::uint32_t>(x, y) = static_cast<std::uint32_t>(std::nearbyint(value * 16777215.0));
                 else
                     depth.at<float>(x, y) = static_cast<float>(value);
-                depth.stencil(x, y) = static_cast<std::uint8_t>(random() % 3 == 0 ? random() % 256 : random() % 2 * 255);
+                depth.stencil(x, y) =
+                    static_cast<std::uint8_t>(random() % 3 == 0 ? random() % 256 : random() % 2 * 255);
             }
         const auto depth_of = [&](std::uint32_t x, std::uint32_t y) -> std::int64_t {
             if (format == Format::d16_unorm) return depth.at<std::uint16_t>(x, y);
@@ -69,9 +72,12 @@ TEST(Output, DepthAndStencilFollowTheFormulas) {
         std::vector<std::int64_t> old_depth;
         std::vector<int> old_stencil;
         for (std::uint32_t y = 0; y < height; ++y)
-            for (std::uint32_t x = 0; x < width; ++x) old_depth.push_back(depth_of(x, y)), old_stencil.push_back(depth.stencil(x, y));
+            for (std::uint32_t x = 0; x < width; ++x)
+                old_depth.push_back(depth_of(x, y)), old_stencil.push_back(depth.stencil(x, y));
 
-        Bench bench(width, height, {&color}, &depth, {.lanes = 4u << random() % 3, .options = {.instruction_set = static_cast<std::uint32_t>(random() % 3)}});
+        Bench bench(
+            width, height, {&color}, &depth,
+            {.lanes = 4u << random() % 3, .options = {.instruction_set = static_cast<std::uint32_t>(random() % 3)}});
         bench.use<TestShader::constant>();
         auto& state = bench.pipeline.depth_stencil;
         state.depth_test = random() % 4 != 0;
@@ -81,7 +87,7 @@ TEST(Output, DepthAndStencilFollowTheFormulas) {
         for (StencilFace* face : {&state.front, &state.back})
             *face = {static_cast<StencilOperation>(random() % 8), static_cast<StencilOperation>(random() % 8),
                      static_cast<StencilOperation>(random() % 8), static_cast<CompareOperation>(random() % 8),
-                     static_cast<std::uint8_t>(random()), static_cast<std::uint8_t>(random())};
+                     static_cast<std::uint8_t>(random()),         static_cast<std::uint8_t>(random())};
         bench.state.stencil_reference = static_cast<std::uint8_t>(random());
         // What a fragment may do that moves the tests behind it.
         const bool late = random() % 2;
@@ -99,9 +105,10 @@ TEST(Output, DepthAndStencilFollowTheFormulas) {
         // The triangle goes right, then down to the left: clockwise as seen.
         const StencilFace& face = bench.pipeline.front_face == FrontFace::clockwise ? state.front : state.back;
         const double z = shader_depth && !bench.pipeline.fragment.early_tests ? 0.25 : 0.5;
-        const std::int64_t key = format == Format::d16_unorm           ? static_cast<std::int64_t>(std::nearbyint(z * 65535.0))
-                                 : format == Format::d24_unorm_s8_uint ? static_cast<std::int64_t>(std::nearbyint(z * 16777215.0))
-                                                                       : std::bit_cast<std::int32_t>(static_cast<float>(z));
+        const std::int64_t key = format == Format::d16_unorm ? static_cast<std::int64_t>(std::nearbyint(z * 65535.0))
+                                 : format == Format::d24_unorm_s8_uint
+                                     ? static_cast<std::int64_t>(std::nearbyint(z * 16777215.0))
+                                     : std::bit_cast<std::int32_t>(static_cast<float>(z));
         std::uint64_t expected_passed = 0;
         for (std::uint32_t y = 0; y < height; ++y)
             for (std::uint32_t x = 0; x < width; ++x) {
@@ -112,11 +119,15 @@ TEST(Output, DepthAndStencilFollowTheFormulas) {
                 bool lives = false;
                 if (!discarded || bench.pipeline.fragment.early_tests) {
                     const int reference = bench.state.stencil_reference;
-                    const bool stencil_passes = !state.stencil_test || passes(face.compare, reference & face.read_mask, old_stencil[i] & face.read_mask);
+                    const bool stencil_passes = !state.stencil_test || passes(face.compare, reference & face.read_mask,
+                                                                              old_stencil[i] & face.read_mask);
                     const bool depth_passes = !state.depth_test || passes(state.depth_compare, key, old_depth[i]);
                     if (state.stencil_test) {
-                        const StencilOperation operation = !stencil_passes ? face.fail : !depth_passes ? face.depth_fail : face.pass;
-                        new_stencil = (changed(operation, old_stencil[i], reference) & face.write_mask) | (old_stencil[i] & ~face.write_mask);
+                        const StencilOperation operation = !stencil_passes ? face.fail
+                                                           : !depth_passes ? face.depth_fail
+                                                                           : face.pass;
+                        new_stencil = (changed(operation, old_stencil[i], reference) & face.write_mask) |
+                                      (old_stencil[i] & ~face.write_mask);
                     }
                     lives = stencil_passes && depth_passes;
                     if (lives && state.depth_test && state.depth_write) new_depth = key;
@@ -133,7 +144,8 @@ TEST(Output, DepthAndStencilFollowTheFormulas) {
     }
 }
 
-double factor(BlendFactor which, int channel, const double* source, const double* second, const double* destination, const double* constant) {
+double factor(BlendFactor which, int channel, const double* source, const double* second, const double* destination,
+              const double* constant) {
     switch (which) {
         case BlendFactor::zero: return 0;
         case BlendFactor::one: return 1;
@@ -155,7 +167,9 @@ double factor(BlendFactor which, int channel, const double* source, const double
     }
     return 0;
 }
-double to_srgb(double linear) { return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055; }
+double to_srgb(double linear) {
+    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+}
 double from_srgb(double code) { return code <= 0.04045 ? code / 12.92 : std::pow((code + 0.055) / 1.055, 2.4); }
 
 TEST(Output, BlendingFollowsTheFormulas) {
@@ -175,22 +189,31 @@ TEST(Output, BlendingFollowsTheFormulas) {
         if (is_float)
             for (std::uint32_t y = 0; y < height; ++y)
                 for (std::uint32_t x = 0; x < width; ++x)
-                    color.at<std::array<float, 4>>(x, y) = {static_cast<float>(old[0]), static_cast<float>(old[1]), static_cast<float>(old[2]), static_cast<float>(old[3])};
+                    color.at<std::array<float, 4>>(x, y) = {static_cast<float>(old[0]), static_cast<float>(old[1]),
+                                                            static_cast<float>(old[2]), static_cast<float>(old[3])};
         else
             color.fill(old_bytes);
         if (format == Format::bgra8_unorm) std::swap(old[0], old[2]);
         if (is_srgb)
             for (int i = 0; i < 3; ++i) old[i] = from_srgb(old[i]);
-        Bench bench(width, height, {&color}, nullptr, {.lanes = 4u << random() % 3, .options = {.instruction_set = static_cast<std::uint32_t>(random() % 3)}});
+        Bench bench(
+            width, height, {&color}, nullptr,
+            {.lanes = 4u << random() % 3, .options = {.instruction_set = static_cast<std::uint32_t>(random() % 3)}});
         bench.use<TestShader::constant>();
         bench.pipeline.fragment.outputs.push_back({cpu::dual_source_output, 4});
-        for (int i = 0; i < 4; ++i) bench.constants.color[i] = unit(random), bench.constants.second_color[i] = unit(random), bench.state.blend_constants[i] = unit(random);
+        for (int i = 0; i < 4; ++i)
+            bench.constants.color[i] = unit(random), bench.constants.second_color[i] = unit(random),
+            bench.state.blend_constants[i] = unit(random);
         ColorTargetState& target = bench.pipeline.color_targets[0];
         target.write_mask = random() % 4 ? 15 : static_cast<std::uint8_t>(random() % 16);
         BlendState& blend = target.blend;
         blend = {random() % 8 != 0,
-                 static_cast<BlendFactor>(random() % 17), static_cast<BlendFactor>(random() % 17), static_cast<BlendOperation>(random() % 5),
-                 static_cast<BlendFactor>(random() % 17), static_cast<BlendFactor>(random() % 17), static_cast<BlendOperation>(random() % 5)};
+                 static_cast<BlendFactor>(random() % 17),
+                 static_cast<BlendFactor>(random() % 17),
+                 static_cast<BlendOperation>(random() % 5),
+                 static_cast<BlendFactor>(random() % 17),
+                 static_cast<BlendFactor>(random() % 17),
+                 static_cast<BlendOperation>(random() % 5)};
         bench.draw(everything());
         bench.end();
 
@@ -202,8 +225,10 @@ TEST(Output, BlendingFollowsTheFormulas) {
         }
         for (int i = 0; i < 4; ++i) {
             const BlendOperation operation = i == 3 ? blend.alpha_operation : blend.color_operation;
-            const double s = source[i] * factor(i == 3 ? blend.source_alpha : blend.source_color, i, source, second, old, constant);
-            const double d = old[i] * factor(i == 3 ? blend.destination_alpha : blend.destination_color, i, source, second, old, constant);
+            const double s =
+                source[i] * factor(i == 3 ? blend.source_alpha : blend.source_color, i, source, second, old, constant);
+            const double d = old[i] * factor(i == 3 ? blend.destination_alpha : blend.destination_color, i, source,
+                                             second, old, constant);
             result[i] = operation == BlendOperation::add                ? s + d
                         : operation == BlendOperation::subtract         ? s - d
                         : operation == BlendOperation::reverse_subtract ? d - s
@@ -242,7 +267,8 @@ TEST(Output, BlendingKeepsTheOrderOfTriangles) {
             bench.use<TestShader::values>();
             bench.pipeline.fragment.discards = late;
             bench.constants.discard_modulus = 0;
-            bench.pipeline.color_targets[0].blend = {.enabled = true, .source_color = BlendFactor::one, .destination_color = BlendFactor::constant_color};
+            bench.pipeline.color_targets[0].blend = {
+                .enabled = true, .source_color = BlendFactor::one, .destination_color = BlendFactor::constant_color};
             bench.state.blend_constants = {0.5f, 0.5f, 0.5f, 0.5f};
             // Many triangles in few pixels, as packing likes them.
             std::vector<TestVertex> vertices;
@@ -252,7 +278,8 @@ TEST(Output, BlendingKeepsTheOrderOfTriangles) {
                 values.push_back(value);
                 for (const auto& [x, y] : {std::pair{62.0, 4.0}, {66.0, 4.0}, {62.0, 8.0}}) {
                     TestVertex vertex;
-                    vertex.position[0] = static_cast<float>(x / (width * 0.5) - 1), vertex.position[1] = static_cast<float>(y / (height * 0.5) - 1);
+                    vertex.position[0] = static_cast<float>(x / (width * 0.5) - 1),
+                    vertex.position[1] = static_cast<float>(y / (height * 0.5) - 1);
                     vertex.values[0] = value;
                     vertices.push_back(vertex);
                 }
@@ -301,13 +328,15 @@ TEST(Output, EveryFormatHoldsItsColor) {
         bench.end();
         for (const auto& [x, y] : {std::pair{0u, 0u}, {69u, 9u}}) {
             const auto* const bytes = &color.at<std::uint8_t>(x, y);
-            EXPECT_EQ(std::vector<std::uint8_t>(bytes, bytes + entry.bytes.size()), entry.bytes) << info(entry.format).name;
+            EXPECT_EQ(std::vector<std::uint8_t>(bytes, bytes + entry.bytes.size()), entry.bytes)
+                << info(entry.format).name;
         }
     }
 }
 
 TEST(Output, IntegerTargetsHoldBitsAndMask) {
-    for (const Format format : {Format::r8_uint, Format::r16_uint, Format::r32_uint, Format::rg32_uint, Format::rgba32_uint, Format::rgba16_uint, Format::rgb10a2_uint}) {
+    for (const Format format : {Format::r8_uint, Format::r16_uint, Format::r32_uint, Format::rg32_uint,
+                                Format::rgba32_uint, Format::rgba16_uint, Format::rgb10a2_uint}) {
         TestImage color(format, width, height);
         color.fill(std::uint8_t{0xff});
         Bench bench(width, height, {&color});

@@ -32,7 +32,8 @@ TEST(Primitives, StripsAndListsDrawTheSame) {
         std::set<std::uint32_t> faces, ids;
         for (std::uint32_t y = 0; y < height; ++y)
             for (std::uint32_t x = 0; x < width; ++x)
-                if (const auto value = image.at<std::array<std::uint32_t, 2>>(x, y); value[0]) ids.insert(value[0]), faces.insert(value[1]);
+                if (const auto value = image.at<std::array<std::uint32_t, 2>>(x, y); value[0])
+                    ids.insert(value[0]), faces.insert(value[1]);
         EXPECT_EQ(faces.size(), 1u);
         EXPECT_EQ(ids.size(), 10u);
     }
@@ -91,11 +92,13 @@ TEST(Primitives, IndicesReadWhatTheySayAndZeroBehindTheBuffer) {
         // The offset is taken off again; five indices in front are skipped.
         std::vector<std::uint16_t> shorts(5, 999);
         std::vector<std::uint32_t> longs(5, 999);
-        for (const std::uint32_t index : indices) shorts.push_back(static_cast<std::uint16_t>(index + 7)), longs.push_back(index + 7);
+        for (const std::uint32_t index : indices)
+            shorts.push_back(static_cast<std::uint16_t>(index + 7)), longs.push_back(index + 7);
         cpu::DrawCall call;
         call.indexed = true;
         call.index_type = is_short ? IndexType::uint16 : IndexType::uint32;
-        call.indices = is_short ? reinterpret_cast<const std::byte*>(shorts.data()) : reinterpret_cast<const std::byte*>(longs.data());
+        call.indices = is_short ? reinterpret_cast<const std::byte*>(shorts.data())
+                                : reinterpret_cast<const std::byte*>(longs.data());
         call.index_bytes = is_short ? shorts.size() * 2 : longs.size() * 4;
         call.first = 5;
         call.count = static_cast<std::uint32_t>(indices.size());
@@ -155,7 +158,7 @@ TEST(Primitives, PointsAreSquaresWithCoordinates) {
         std::uint32_t x0, x1, y0, y1;  ///< Pixels, the end exclusive.
     };
     const Case cases[] = {
-        {10.5, 10.5, 1, 10, 11, 10, 11}, {20, 20, 4, 18, 22, 18, 22},   {40.5, 30.5, 3, 39, 42, 29, 32},
+        {10.5, 10.5, 1, 10, 11, 10, 11},   {20, 20, 4, 18, 22, 18, 22},   {40.5, 30.5, 3, 39, 42, 29, 32},
         {50, 50, 1, 49, 50, 49, 50},  // On the corner of four pixels: left and top edges are inside, at 49.5.
         {60.25, 20.25, 2, 59, 61, 19, 21}, {80, 30, 0.2, 79, 80, 29, 30}, {0.5, 0.5, 5, 0, 3, 0, 3},
     };
@@ -168,7 +171,8 @@ TEST(Primitives, PointsAreSquaresWithCoordinates) {
         std::vector<TestVertex> vertices = {window(entry.x, entry.y)};
         vertices[0].point_size = static_cast<float>(entry.size);
         bench.draw(vertices);
-        EXPECT_EQ(bench.passed(), std::uint64_t{entry.x1 - entry.x0} * (entry.y1 - entry.y0)) << entry.x << " " << entry.size;
+        EXPECT_EQ(bench.passed(), std::uint64_t{entry.x1 - entry.x0} * (entry.y1 - entry.y0))
+            << entry.x << " " << entry.size;
         bench.end();
         const double size = std::max(entry.size, 1.0);
         for (std::uint32_t y = 0; y < height; ++y)
@@ -181,7 +185,8 @@ TEST(Primitives, PointsAreSquaresWithCoordinates) {
                 ASSERT_NEAR(value[1], 0.5 + (y + 0.5 - entry.y) / size, 1e-6);
             }
     }
-    // Outside of the clip volume a point vanishes as a whole, with NaN as a size it is small, and too large ones are cut.
+    // Outside of the clip volume a point vanishes as a whole, with NaN as a size it is small, and too large ones are
+    // cut.
     for (const float size : {NAN, -5.0f, 1e30f, INFINITY}) {
         TestImage image(Format::rgba32_float, width, height);
         Bench bench(width, height, {&image});
@@ -197,8 +202,9 @@ TEST(Primitives, PointsAreSquaresWithCoordinates) {
     }
 }
 
-/// Whether the line from a to b leaves the diamond of the pixel: it comes into it, and does not end there. The distance along the line
-/// in the norm of diamonds is convex, and least at an end or where the line passes the center along an axis.
+/// Whether the line from a to b leaves the diamond of the pixel: it comes into it, and does not end there. The distance
+/// along the line in the norm of diamonds is convex, and least at an end or where the line passes the center along an
+/// axis.
 bool leaves_diamond(const double* a, const double* b, int pixel_x, int pixel_y) {
     const double from_x = a[0] - pixel_x - 0.5, from_y = a[1] - pixel_y - 0.5, run_x = b[0] - a[0], run_y = b[1] - a[1];
     const auto inside = [&](double t) { return std::abs(from_x + run_x * t) + std::abs(from_y + run_y * t) < 0.5; };
@@ -216,13 +222,15 @@ TEST(Primitives, LinesCoverThePixelsWhoseDiamondTheyLeave) {
             for (int axis = 0; axis < 2; ++axis) {
                 // Odd multiples of 1/256 keep away from ties.
                 end[axis] = (static_cast<int>(random() % (40 * 256)) | 1) / 256.0 + (axis == 0 ? 45 : 10);
-                if (round % 5 == 0) end[axis] = std::floor(end[axis] / 4) + (axis == 0 ? 45 : 10) + 51 / 256.0 * (1 + random() % 4);
+                if (round % 5 == 0)
+                    end[axis] = std::floor(end[axis] / 4) + (axis == 0 ? 45 : 10) + 51 / 256.0 * (1 + random() % 4);
             }
         TestImage image(Format::r32_float, width, height);
         Bench bench(width, height, {&image});
         bench.use<TestShader::constant>();
         bench.pipeline.topology = round % 2 ? Topology::line_list : Topology::line_strip;
-        bench.pipeline.color_targets[0].blend = {.enabled = true, .source_color = BlendFactor::one, .destination_color = BlendFactor::one};
+        bench.pipeline.color_targets[0].blend = {
+            .enabled = true, .source_color = BlendFactor::one, .destination_color = BlendFactor::one};
         bench.draw({window(ends[0][0], ends[0][1]), window(ends[1][0], ends[1][1])});
         bench.end();
         for (int y = 0; y < static_cast<int>(height); ++y)
@@ -238,7 +246,8 @@ TEST(Primitives, ConnectedLinesDrawNoPixelTwice) {
     Bench bench(width, height, {&image});
     bench.use<TestShader::constant>();
     bench.pipeline.topology = Topology::line_strip;
-    bench.pipeline.color_targets[0].blend = {.enabled = true, .source_color = BlendFactor::one, .destination_color = BlendFactor::one};
+    bench.pipeline.color_targets[0].blend = {
+        .enabled = true, .source_color = BlendFactor::one, .destination_color = BlendFactor::one};
     std::vector<TestVertex> vertices;
     for (int i = 0; i <= 16; ++i) vertices.push_back(window(4.3 + 7 * i, 20.2 + 2 * i));
     bench.draw(vertices);
@@ -261,7 +270,8 @@ TEST(Primitives, LinesInterpolateAndClip) {
     // From far left of the picture to its right, with perspective.
     std::vector<TestVertex> vertices(2);
     vertices[0].position[0] = -5e6f, vertices[0].position[1] = 0.01f, vertices[0].position[2] = 0.5f;
-    vertices[1].position[0] = 3, vertices[1].position[1] = 0.03f, vertices[1].position[2] = 1.5f, vertices[1].position[3] = 3;
+    vertices[1].position[0] = 3, vertices[1].position[1] = 0.03f, vertices[1].position[2] = 1.5f,
+    vertices[1].position[3] = 3;
     vertices[0].values[0] = -5e6f, vertices[1].values[0] = 3;  // The x of clip space: x / w of it is known everywhere.
     vertices[0].values[3] = 7, vertices[1].values[3] = 8;
     bench.draw(vertices);
@@ -308,13 +318,15 @@ TEST(Samples, CoverageIsExactForEachSample) {
         }
         TestImage color(Format::r32_float, width, height, 4), depth(Format::d32_float, width, height, 4);
         depth.fill(1.0f);
-        Bench bench(width, height, {&color}, &depth, {.options = {.instruction_set = static_cast<std::uint32_t>(round % 3)}}, 4);
+        Bench bench(width, height, {&color}, &depth,
+                    {.options = {.instruction_set = static_cast<std::uint32_t>(round % 3)}}, 4);
         bench.use<TestShader::constant>();
         bench.pipeline.depth_stencil.depth_test = bench.pipeline.depth_stencil.depth_write = true;
         bench.draw(vertices);
         const std::uint64_t passed = bench.passed();
         bench.end();
-        std::int64_t area = (points[1][0] - points[0][0]) * (points[2][1] - points[0][1]) - (points[2][0] - points[0][0]) * (points[1][1] - points[0][1]);
+        std::int64_t area = (points[1][0] - points[0][0]) * (points[2][1] - points[0][1]) -
+                            (points[2][0] - points[0][0]) * (points[1][1] - points[0][1]);
         if (area < 0) std::swap(points[1], points[2]);
         // The standard positions, in sixteenths.
         const int offsets[4][2] = {{6, 2}, {14, 6}, {2, 10}, {10, 14}};
@@ -326,11 +338,14 @@ TEST(Samples, CoverageIsExactForEachSample) {
                     bool inside = area != 0;
                     for (int i = 0; i < 3; ++i) {
                         const auto *from = points[i], *to = points[(i + 1) % 3];
-                        const std::int64_t side = (to[0] - from[0]) * (py - from[1]) - (to[1] - from[1]) * (px - from[0]);
-                        inside = inside && (side > 0 || (side == 0 && (to[1] < from[1] || (to[1] == from[1] && to[0] > from[0]))));
+                        const std::int64_t side =
+                            (to[0] - from[0]) * (py - from[1]) - (to[1] - from[1]) * (px - from[0]);
+                        inside = inside && (side > 0 ||
+                                            (side == 0 && (to[1] < from[1] || (to[1] == from[1] && to[0] > from[0]))));
                     }
                     expected_passed += inside;
-                    ASSERT_EQ(color.at<float>(x, y, s), inside ? 1.0f : 0.0f) << round << ": " << x << ", " << y << ", " << s;
+                    ASSERT_EQ(color.at<float>(x, y, s), inside ? 1.0f : 0.0f)
+                        << round << ": " << x << ", " << y << ", " << s;
                     ASSERT_EQ(depth.at<float>(x, y, s), inside ? 0.5f : 1.0f);
                 }
         EXPECT_EQ(passed, expected_passed);
@@ -340,7 +355,8 @@ TEST(Samples, CoverageIsExactForEachSample) {
 
 TEST(Samples, ShadersRunForPixelsOrForSamplesAndSeeTheirCoverage) {
     // The left half of pixel column 20: samples 0 (at 6/16) and 2 (at 2/16) lie left of 20.5.
-    const std::vector<TestVertex> vertices = {window(0, 0), window(20.5, 0), window(0, 200), window(20.5, 0), window(20.5, 200), window(0, 200)};
+    const std::vector<TestVertex> vertices = {window(0, 0),    window(20.5, 0),   window(0, 200),
+                                              window(20.5, 0), window(20.5, 200), window(0, 200)};
     for (const bool per_sample : {false, true})
         for (const std::uint32_t lanes : {4u, 8u, 16u}) {
             TestImage color(Format::rgba32_uint, width, height, 4);

@@ -21,7 +21,8 @@ std::vector<std::vector<std::byte>> draw_scene(BenchSetup setup, std::uint32_t s
         std::vector<TestVertex> vertices;
         const int triangles = draw % 6 == 0 ? 2000 : 40;
         for (int i = 0; i < triangles; ++i) {
-            const float x = unit(random), y = unit(random), size = draw % 6 == 0 ? 0.05f : 0.2f + std::abs(unit(random));
+            const float x = unit(random), y = unit(random),
+                        size = draw % 6 == 0 ? 0.05f : 0.2f + std::abs(unit(random));
             for (int corner = 0; corner < 3; ++corner) {
                 TestVertex vertex;
                 const float w = draw % 4 == 1 ? unit(random) + 0.8f : 1.0f;
@@ -32,22 +33,37 @@ std::vector<std::vector<std::byte>> draw_scene(BenchSetup setup, std::uint32_t s
                 vertices.push_back(vertex);
             }
         }
-        const Topology topologies[] = {Topology::triangle_list, Topology::triangle_strip, Topology::line_list, Topology::point_list};
+        const Topology topologies[] = {Topology::triangle_list, Topology::triangle_strip, Topology::line_list,
+                                       Topology::point_list};
         bench.pipeline.topology = topologies[draw % 8 < 5 ? 0 : draw % 8 - 4];
         bench.use<TestShader::values>();
         auto& state = bench.pipeline.depth_stencil;
         state.depth_test = draw % 5 != 4;
         state.depth_write = draw % 3 != 2;
-        const CompareOperation compares[] = {CompareOperation::less, CompareOperation::less_or_equal, CompareOperation::greater, CompareOperation::always, CompareOperation::greater_or_equal, CompareOperation::not_equal};
+        const CompareOperation compares[] = {
+            CompareOperation::less,   CompareOperation::less_or_equal,    CompareOperation::greater,
+            CompareOperation::always, CompareOperation::greater_or_equal, CompareOperation::not_equal};
         state.depth_compare = compares[draw % 6];
         state.stencil_test = draw % 7 == 3;
-        state.front = {StencilOperation::invert, StencilOperation::increment_wrap, StencilOperation::replace, CompareOperation::less_or_equal, 0xff, 0x7f};
-        state.back = {StencilOperation::keep, StencilOperation::zero, StencilOperation::decrement_wrap, CompareOperation::always, 0x3f, 0xff};
+        state.front = {StencilOperation::invert,
+                       StencilOperation::increment_wrap,
+                       StencilOperation::replace,
+                       CompareOperation::less_or_equal,
+                       0xff,
+                       0x7f};
+        state.back = {StencilOperation::keep,
+                      StencilOperation::zero,
+                      StencilOperation::decrement_wrap,
+                      CompareOperation::always,
+                      0x3f,
+                      0xff};
         bench.state.stencil_reference = static_cast<std::uint8_t>(draw * 11);
         bench.pipeline.fragment.discards = draw % 4 == 2;
         bench.constants.discard_modulus = draw % 4 == 2 ? 3 : 0;
         bench.pipeline.fragment.runs_per_sample = samples > 1 && draw % 5 == 1;
-        bench.pipeline.color_targets[0].blend = {draw % 3 == 1, BlendFactor::source_alpha, BlendFactor::one_minus_source_alpha, BlendOperation::add, BlendFactor::one, BlendFactor::one_minus_source_alpha};
+        bench.pipeline.color_targets[0].blend = {
+            draw % 3 == 1,       BlendFactor::source_alpha, BlendFactor::one_minus_source_alpha,
+            BlendOperation::add, BlendFactor::one,          BlendFactor::one_minus_source_alpha};
         bench.pipeline.color_targets[0].write_mask = draw % 9 == 8 ? 5 : 15;
         if (draw % 10 == 9) bench.state.scissor = {13, 17, 99, 66};
         bench.draw(vertices);
@@ -63,7 +79,9 @@ std::vector<std::vector<std::byte>> draw_scene(BenchSetup setup, std::uint32_t s
 TEST(Stability, PictureIsTheSameForThreadsLanesAndInstructionSets) {
     for (const std::uint32_t samples : {1u, 4u}) {
         std::uint64_t expected_passed = 0;
-        const auto expected = draw_scene({.lanes = 4, .threads = 1, .options = {.instruction_set = 0, .hierarchical_depth = false}}, samples, expected_passed);
+        const auto expected =
+            draw_scene({.lanes = 4, .threads = 1, .options = {.instruction_set = 0, .hierarchical_depth = false}},
+                       samples, expected_passed);
         EXPECT_GT(expected_passed, 100'000u);
         for (const std::uint32_t threads : {1u, 3u})
             for (const std::uint32_t lanes : {4u, 8u, 16u})
@@ -71,8 +89,10 @@ TEST(Stability, PictureIsTheSameForThreadsLanesAndInstructionSets) {
                     for (const bool hierarchical : {false, true}) {
                         std::uint64_t passed = 0;
                         const auto got = draw_scene({lanes, threads, {instruction_set, hierarchical}}, samples, passed);
-                        EXPECT_EQ(passed, expected_passed) << threads << " " << lanes << " " << instruction_set << " " << hierarchical;
-                        EXPECT_TRUE(got == expected) << threads << " " << lanes << " " << instruction_set << " " << hierarchical;
+                        EXPECT_EQ(passed, expected_passed)
+                            << threads << " " << lanes << " " << instruction_set << " " << hierarchical;
+                        EXPECT_TRUE(got == expected)
+                            << threads << " " << lanes << " " << instruction_set << " " << hierarchical;
                     }
     }
 }
@@ -88,11 +108,15 @@ TEST(Stability, HierarchicalDepthSkipsFragmentsAndChangesNothing) {
         bench.pipeline.depth_stencil.depth_test = bench.pipeline.depth_stencil.depth_write = true;
         std::mt19937 random(31);
         std::uniform_real_distribution<float> unit(0.0f, 1.0f);
-        for (const CompareOperation compare : {CompareOperation::less, CompareOperation::less_or_equal, CompareOperation::greater, CompareOperation::greater_or_equal, CompareOperation::always, CompareOperation::less}) {
+        for (const CompareOperation compare :
+             {CompareOperation::less, CompareOperation::less_or_equal, CompareOperation::greater,
+              CompareOperation::greater_or_equal, CompareOperation::always, CompareOperation::less}) {
             bench.pipeline.depth_stencil.depth_compare = compare;
             std::vector<TestVertex> vertices;
             for (int i = 0; i < 120; ++i)
-                for (int corner = 0; corner < 3; ++corner) vertices.push_back(at_window(600 * unit(random) - 150, 600 * unit(random) - 150, 256, 256, unit(random)));
+                for (int corner = 0; corner < 3; ++corner)
+                    vertices.push_back(
+                        at_window(600 * unit(random) - 150, 600 * unit(random) - 150, 256, 256, unit(random)));
             bench.draw(vertices);
         }
         bench.end();
@@ -104,14 +128,17 @@ TEST(Stability, HierarchicalDepthSkipsFragmentsAndChangesNothing) {
 }
 
 TEST(Stability, WildVerticesHarmNothing) {
-    const float wild[] = {0.0f, -0.0f, 1.0f, -1.0f, 1e-30f, 1e30f, -1e30f, 3e38f, -3e38f, 1e-45f, INFINITY, -INFINITY, NAN, 0.5f, 1e7f, -32768.0f};
+    const float wild[] = {0.0f,   -0.0f,  1.0f,     -1.0f,     1e-30f, 1e30f, -1e30f, 3e38f,
+                          -3e38f, 1e-45f, INFINITY, -INFINITY, NAN,    0.5f,  1e7f,   -32768.0f};
     std::mt19937 random(41);
     for (int round = 0; round < 60; ++round) {
         TestImage color(Format::rgba32_float, width, height), depth(Format::d32_float_s8_uint, width, height);
         depth.fill(1.0f);
-        Bench bench(width, height, {&color}, &depth, {.options = {.instruction_set = static_cast<std::uint32_t>(round % 3)}});
+        Bench bench(width, height, {&color}, &depth,
+                    {.options = {.instruction_set = static_cast<std::uint32_t>(round % 3)}});
         bench.use<TestShader::values>();
-        const Topology topologies[] = {Topology::triangle_list, Topology::line_list, Topology::point_list, Topology::triangle_strip, Topology::line_strip};
+        const Topology topologies[] = {Topology::triangle_list, Topology::line_list, Topology::point_list,
+                                       Topology::triangle_strip, Topology::line_strip};
         bench.pipeline.topology = topologies[round % 5];
         bench.pipeline.fill = round % 7 == 0 ? FillMode::line : FillMode::fill;
         bench.pipeline.depth_stencil.depth_test = bench.pipeline.depth_stencil.depth_write = true;
@@ -145,8 +172,9 @@ TEST(Stability, BadVertexDropsItsPrimitiveOnly) {
             TestImage color(Format::r32_uint, 128, 64);
             Bench bench(128, 64, {&color});
             bench.use<TestShader::primitive_id>(1);
-            std::vector<TestVertex> vertices = {at_window(0, 0, 128, 64),  at_window(60, 0, 128, 64),  at_window(0, 60, 128, 64),
-                                                at_window(64, 0, 128, 64), at_window(120, 0, 128, 64), at_window(64, 60, 128, 64)};
+            std::vector<TestVertex> vertices = {at_window(0, 0, 128, 64),   at_window(60, 0, 128, 64),
+                                                at_window(0, 60, 128, 64),  at_window(64, 0, 128, 64),
+                                                at_window(120, 0, 128, 64), at_window(64, 60, 128, 64)};
             vertices[1].position[axis] = bad;
             bench.draw(vertices);
             bench.end();
@@ -159,7 +187,8 @@ TEST(Stability, EmptyThingsAreNothing) {
     TestImage color(Format::r32_uint, 64, 64);
     Bench bench(64, 64, {&color});
     bench.use<TestShader::primitive_id>(1);
-    const std::vector<TestVertex> vertices = {at_window(0, 0, 64, 64), at_window(60, 0, 64, 64), at_window(0, 60, 64, 64)};
+    const std::vector<TestVertex> vertices = {at_window(0, 0, 64, 64), at_window(60, 0, 64, 64),
+                                              at_window(0, 60, 64, 64)};
     bench.state.scissor = {0, 0, 0, 64};
     bench.draw(vertices);
     bench.state.scissor = {64, 64, ~0u, ~0u};
@@ -192,7 +221,8 @@ TEST(Stability, LargeDrawsGoThroughInParts) {
     std::vector<TestVertex> vertices;
     for (int i = 0; i < 300'000; ++i) {
         const double x = i % 60, y = i / 60 % 60;
-        for (const auto& [dx, dy] : {std::pair{0.0, 0.0}, {2.0, 0.0}, {0.0, 2.0}}) vertices.push_back(at_window(x + dx, y + dy, 64, 64));
+        for (const auto& [dx, dy] : {std::pair{0.0, 0.0}, {2.0, 0.0}, {0.0, 2.0}})
+            vertices.push_back(at_window(x + dx, y + dy, 64, 64));
     }
     bench.draw(vertices);
     const std::uint64_t passed = bench.passed();
@@ -201,7 +231,8 @@ TEST(Stability, LargeDrawsGoThroughInParts) {
     EXPECT_EQ(passed, 300'000u);
     // The last triangle over each pixel is seen: those of the last sheet, 3600 before the end and later.
     for (std::uint32_t y = 1; y < 59; ++y)
-        for (std::uint32_t x = 1; x < 59; ++x) ASSERT_GT(color.at<std::uint32_t>(x, y), 300'000u - 3600u - 1200u) << x << ", " << y;
+        for (std::uint32_t x = 1; x < 59; ++x)
+            ASSERT_GT(color.at<std::uint32_t>(x, y), 300'000u - 3600u - 1200u) << x << ", " << y;
 }
 
 TEST(Stability, ExpiredWorkStops) {
