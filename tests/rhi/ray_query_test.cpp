@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+// Acceleration structures and ray queries, against intersections worked out in double precision.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "tests/rhi/backend_test.h"
+
+namespace nacre::test {
+namespace {
+
+using namespace rhi;
+
+BACKEND_SUITE(RayQueries);
+
+using Vector = std::array<double, 3>;
+Vector operator-(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vector cross(const Vector& a, const Vector& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+/// As the shaders below read and write them.
+struct Ray {
+    std::array<float, 3> origin{};
+    float t_min = 0;
+    std::array<float, 3> direction{};
+    float t_max = 1e9f;
+    std::uint32_t flags = 0, mask = 0xff, reserved[2] = {};
+};
+struct Hit {
+    std::uint32_t type = 0;
+    float t = 0;
+    std::uint32_t primitive = 0, geometry = 0;
+    std::uint32_t instance = 0, custom_index = 0, table_offset = 0, front_face = 0;
+    float u = 0, v = 0;
+    std::uint32_t candidates = 0, reserved = 0;
+};
+static_assert(sizeof(Ray) == 48 && sizeof(Hit) == 48);
+
+const std::string declarations = R"(
+#extension GL_EXT_ray_query : require
+layout(local_size_x = 32) in;
+struct Ray { vec3 origin; float t_min; vec3 direction; float t_max; uvec4 flags; };
+struct Hit { uvec4 a; uvec4 b; uvec4 c; };
+layout(set = 0, binding = 0) uniform accelerationStructureEXT scene;
+layout(set = 0, binding = 1) readonly buffer Rays { Ray rays[]; };
+layout(set = 0, binding = 2) writeonly buffer Hits { Hit hits[]; };
+void store(uint i, rayQueryEXT query, uint candidates) {
+    Hit hit = Hit(uvec4(0), uvec4(0), uvec4(0, 0, candidates, 0));
+    hit.a.x = rayQueryGetIntersectionTypeEXT(query, true);
+    if (hit.a.x != gl_RayQueryCommittedIntersectionNoneEXT) {
+        hit.a.y = floatBitsToUint(rayQueryGetIntersectionTEXT(query, true));
+        hit.a.z = rayQueryGetIntersectionPrimitiveIndexEXT(query, true);
+        hit.a.w = rayQueryGetIntersectionGeometryIndexEXT(query, true);
+        hit.b.x = rayQueryGetIntersectionInstanceIdEXT(query, true);
+        hit.b.y = rayQueryGetIntersectionInstanceCustomIndexEXT(query, true);
+        hit.b.z = rayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetEXT(query, true);
+        hit.b.w = rayQueryGetIntersectionFrontFaceEXT(query, true) ? 1u : 0u;
+        hit.c.xy = floatBitsToUint(rayQueryGetIntersectionBarycentricsEXT(query, true));
+    }
+    hits[i] = hit;
+}
+)";
+const std::string closest_hit = declarations + R"(
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= rays.length()) return;
+    rayQueryEXT query;
+    rayQueryInitializeEXT(query, scene, rays[i].flags.x, rays[i].flags.y, rays[i].origin, rays[i].t_min, rays[i].direction,
+                          rays[i].t_max);
+    uint candidates = 0;
+    while (rayQueryProceedEXT(query)) ++candidates;
+    store(i, query, candidates);
+}
+)";
+
+/// Triangles without shared vertices.
+struct Mesh {
+    std::vector<float> positions;
+    [[nodiscard]] std::uint32_t triangles() const { return static_cast<std::uint32_t>(positions.size() / 9); }
+    [[nodiscard]] Vector corner(std::uint32_t triangle, std::uint32_t k) const {
+        const float* p = positions.data() + (std::size_t{triangle} * 3 + k) * 3;
+        return {p[0], p[1], p[2]};
+    }
+};
+
+Mesh random_mesh(std::uint32_t triangles, std::uint32_t seed, float size = 0.3f) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> place(-1, 1), offset(-size, size);
+    Mesh mesh;
+    for (std::uint32_t i = 0; i < triangles; ++i) {
+        const float center[3] = {place(random), place(random), place(random)};
+        for (int k = 0; k < 9; ++k) mesh.positions.push_back(center[k % 3] + offset(random));
+    }
+    return mesh;
+}
+
+std::vector<Ray> random_rays(std::size_t count, std::uint32_t seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> place(-2, 2), aim(-1, 1);
+    std::vector<Ray> rays(count);
+    for (Ray& ray : rays) {
+        for (float& value : ray.origin) value = place(random);
+        for (std::size_t axis = 0; axis < 3; ++axis) ray.direction[axis] = aim(random) - ray.origin[axis];
+    }
+    return rays;
+}
+
+struct Reference {
+    double t = std::numeric_limits<double>::infinity();
+    std::uint32_t primitive = 0;
+    double u = 0, v = 0;
+    double margin = std::numeric_limits<double>::infinity();  ///< How near the ray came to an edge or to another hit.
+    bool is_front = false;
+};
+
+/// Closest hit in double precision, by Cramer's rule, with the distance to all that could tip the balance.
+template <typename Accept>
+Reference trace(const Mesh& mesh, const Ray& ray, Accept&& accept) {
+    Reference best;
+    double second = std::numeric_limits<double>::infinity(), nearest_edge = second;
+    const Vector origin{ray.origin[0], ray.origin[1], ray.origin[2]};
+    const Vector direction{ray.direction[0], ray.direction[1], ray.direction[2]};
+    for (std::uint32_t i = 0; i < mesh.triangles(); ++i) {
+        const Vector e1 = mesh.corner(i, 1) - mesh.corner(i, 0), e2 = mesh.corner(i, 2) - mesh.corner(i, 0);
+        const Vector normal = cross(e1, e2), to_origin = origin - mesh.corner(i, 0);
+        const double determinant = -dot(direction, normal);
+        if (determinant == 0) continue;
+        const Vector q = cross(to_origin, direction);
+        const double u = dot(e2, q) / determinant, v = -dot(e1, q) / determinant, t = dot(to_origin, normal) / determinant;
+        nearest_edge = std::min(nearest_edge, std::max({-u, -v, u + v - 1}) >= 0 ? std::max({-u, -v, u + v - 1})
+                                                                                 : std::min({u, v, 1 - u - v}));
+        if (u < 0 || v < 0 || u + v > 1 || t <= ray.t_min || t >= ray.t_max) continue;
+        // Front faces have their vertices clockwise as seen from the origin of the ray.
+        const bool is_front = dot(direction, normal) > 0;
+        if (!accept(i, is_front)) continue;
+        if (t < best.t) second = best.t, best.t = t, best.primitive = i, best.u = u, best.v = v, best.is_front = is_front;
+        else second = std::min(second, t);
+    }
+    best.margin = std::min(nearest_edge, second - best.t);
+    return best;
+}
+
+class Scene {
+  public:
+    Scene(BackendTest& test, const Mesh& mesh, bool opaque = true, bool allow_update = false) : test_(test) {
+        vertices = test.buffer_of<float>(mesh.positions, BufferUsage::acceleration_structure_input, "vertices");
+        bottom = test.ok(test.device().create_acceleration_structure(
+            {.level = AccelerationStructureLevel::bottom,
+             .geometries = {{.opaque = opaque, .primitive_count = mesh.triangles(), .vertex_count = mesh.triangles() * 3}},
+             .allow_update = allow_update,
+             .name = "bottom"}));
+        top = test.ok(test.device().create_acceleration_structure(
+            {.level = AccelerationStructureLevel::top, .max_instances = 8, .allow_update = allow_update, .name = "top"}));
+    }
+    void build(std::vector<AccelerationStructureInstance> instances = {}) {
+        if (instances.empty()) instances.resize(1);
+        for (AccelerationStructureInstance& instance : instances)
+            if (!instance.bottom_level) instance.bottom_level = bottom;
+        CommandList list = test_.device().create_command_list("build");
+        list.build_acceleration_structure(bottom, std::array{GeometrySource{.vertices = vertices}});
+        list.build_acceleration_structure(top, instances);
+        test_.run(std::move(list));
+    }
+    std::vector<Hit> trace(const std::vector<Ray>& rays, const std::string& shader = closest_hit) {
+        const ComputePipeline pipeline = test_.compute(shader);
+        const Buffer input = test_.buffer_of<Ray>(rays, BufferUsage::storage, "rays");
+        const Buffer output = test_.buffer(rays.size() * sizeof(Hit), BufferUsage::storage, "hits");
+        test_.dispatch(pipeline,
+                       {{.binding = 0, .acceleration_structure = top},
+                        {.binding = 1, .buffer = input},
+                        {.binding = 2, .buffer = output}},
+                       {static_cast<std::uint32_t>((rays.size() + 31) / 32), 1, 1});
+        return test_.read<Hit>(output);
+    }
+    Buffer vertices;
+    AccelerationStructure bottom, top;
+
+  private:
+    BackendTest& test_;
+};
+
+/// Counts rays that are clear of ties and edges; each of them must agree.
+void expect_agreement(const Mesh& mesh, const std::vector<Ray>& rays, const std::vector<Hit>& hits,
+                      const std::function<bool(std::size_t, std::uint32_t, bool)>& accept) {
+    std::size_t compared = 0, hit_count = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        const Reference expected = trace(mesh, rays[i], [&](std::uint32_t p, bool front) { return accept(i, p, front); });
+        if (expected.margin < 1e-4) continue;
+        ++compared;
+        const bool is_hit = std::isfinite(expected.t);
+        ASSERT_EQ(hits[i].type, is_hit ? 1u : 0u) << "ray " << i;
+        if (!is_hit) continue;
+        ++hit_count;
+        ASSERT_EQ(hits[i].primitive, expected.primitive) << "ray " << i;
+        ASSERT_NEAR(hits[i].t, expected.t, 1e-4 * (1 + expected.t)) << "ray " << i;
+        ASSERT_NEAR(hits[i].u, expected.u, 1e-3) << "ray " << i;
+        ASSERT_NEAR(hits[i].v, expected.v, 1e-3) << "ray " << i;
+        ASSERT_EQ(hits[i].front_face, expected.is_front ? 1u : 0u) << "ray " << i;
+    }
+    EXPECT_GT(compared, rays.size() / 3);
+    EXPECT_GT(hit_count, rays.size() / 20);
+}
+
+TEST_P(RayQueries, ClosestHitsAgreeWithDoublePrecision) {
+    SKIP_WITHOUT(capabilities().ray_query);
+    const Mesh mesh = random_mesh(100, 1);
+    Scene scene(*this, mesh);
+    scene.build();
+    const std::vector<Ray> rays = random_rays(1000, 2);
+    const std::vector<Hit> hits = scene.trace(rays);
+    expect_agreement(mesh, rays, hits, [](std::size_t, std::uint32_t, bool) { return true; });
+    for (const Hit& hit : hits) ASSERT_EQ(hit.candidates, 0u);
+}
+
+}  // namespace
+}  // namespace nacre::test
