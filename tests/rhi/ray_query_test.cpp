@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <random>
 
@@ -214,6 +215,229 @@ TEST_P(RayQueries, ClosestHitsAgreeWithDoublePrecision) {
     const std::vector<Hit> hits = scene.trace(rays);
     expect_agreement(mesh, rays, hits, [](std::size_t, std::uint32_t, bool) { return true; });
     for (const Hit& hit : hits) ASSERT_EQ(hit.candidates, 0u);
+}
+
+TEST_P(RayQueries, LimitsAndCullingAgreeWithDoublePrecision) {
+    SKIP_WITHOUT(capabilities().ray_query);
+    const Mesh mesh = random_mesh(100, 3);
+    Scene scene(*this, mesh);
+    scene.build();
+    std::vector<Ray> rays = random_rays(1000, 4);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        rays[i].t_min = 0.7f;
+        rays[i].t_max = 1.3f;
+        rays[i].flags = i % 3 == 0 ? 0u : i % 3 == 1 ? 0x10u : 0x20u;
+    }
+    const std::vector<Hit> hits = scene.trace(rays);
+    expect_agreement(mesh, rays, hits, [](std::size_t i, std::uint32_t, bool front) { return i % 3 == 0 || (i % 3 == 1) == front; });
+}
+
+TEST_P(RayQueries, RaysThatSkipOrCullEverythingHitNothing) {
+    SKIP_WITHOUT(capabilities().ray_query);
+    Scene opaque(*this, random_mesh(300, 5, 1.0f)), other(*this, random_mesh(300, 5, 1.0f), false);
+    opaque.build();
+    other.build();
+    std::vector<Ray> rays = random_rays(128, 6);
+    const auto hits_with = [&](Scene& scene, std::uint32_t flags, std::uint32_t mask) {
+        for (Ray& ray : rays) ray.flags = flags, ray.mask = mask;
+        std::size_t hits = 0, candidates = 0;
+        for (const Hit& hit : scene.trace(rays)) hits += hit.type, candidates += hit.candidates;
+        return std::pair(hits, candidates);
+    };
+    const std::size_t all = hits_with(opaque, 0, 0xff).first;
+    EXPECT_GT(all, 60u);
+    EXPECT_EQ(hits_with(opaque, 0x40, 0xff), std::pair(std::size_t{0}, std::size_t{0}));   // Cull opaque.
+    EXPECT_EQ(hits_with(opaque, 0x80, 0xff).first, all);                                   // Cull what is not.
+    EXPECT_EQ(hits_with(opaque, 0x100, 0xff), std::pair(std::size_t{0}, std::size_t{0}));  // Skip triangles.
+    EXPECT_EQ(hits_with(opaque, 0x4, 0xff).first, all);                                    // Terminate on the first hit.
+    EXPECT_EQ(hits_with(opaque, 0, 0).first, 0u);
+    EXPECT_EQ(hits_with(opaque, 0x2, 0xff).first, 0u);                                     // No opaque: nobody confirms.
+    EXPECT_GT(hits_with(opaque, 0x2, 0xff).second, all);
+    EXPECT_EQ(hits_with(other, 0, 0xff).first, 0u);
+    EXPECT_GT(hits_with(other, 0, 0xff).second, all);
+    EXPECT_EQ(hits_with(other, 0x1, 0xff), std::pair(all, std::size_t{0}));                // Opaque.
+    EXPECT_EQ(hits_with(other, 0x80, 0xff), std::pair(std::size_t{0}, std::size_t{0}));
+}
+
+TEST_P(RayQueries, CandidatesThatTheShaderConfirmsGiveTheClosestOfThem) {
+    SKIP_WITHOUT(capabilities().ray_query);
+    // Large triangles: rays meet far more of them than are kept at a time.
+    const Mesh mesh = random_mesh(150, 7, 1.5f);
+    Scene scene(*this, mesh, false);
+    scene.build();
+    const std::vector<Ray> rays = random_rays(500, 8);
+    const std::vector<Hit> hits = scene.trace(rays, declarations + R"(
+        void main() {
+            uint i = gl_GlobalInvocationID.x;
+            if (i >= rays.length()) return;
+            rayQueryEXT query;
+            rayQueryInitializeEXT(query, scene, rays[i].flags.x, 0xff, rays[i].origin, rays[i].t_min, rays[i].direction, rays[i].t_max);
+            uint candidates = 0;
+            while (rayQueryProceedEXT(query)) {
+                ++candidates;
+                uint primitive = rayQueryGetIntersectionPrimitiveIndexEXT(query, false);
+                if (primitive % 16 == i % 16) rayQueryConfirmIntersectionEXT(query);
+            }
+            store(i, query, candidates);
+        })");
+    std::size_t many = 0;
+    for (const Hit& hit : hits) many += hit.candidates > 10;
+    EXPECT_GT(many, 20u);
+    expect_agreement(mesh, rays, hits, [](std::size_t i, std::uint32_t p, bool) { return p % 16 == i % 16; });
+}
+
+TEST_P(RayQueries, InstancesHaveTransformsMasksAndNumbers) {
+    SKIP_WITHOUT(capabilities().ray_query);
+    // One triangle, twice: beside each other, one of them scaled by 2 and 3 along the ray.
+    Scene scene(*this, Mesh{{-1, -1, 0, 1, -1, 0, 0, 1, 0}});
+    scene.build({{.transform = {1, 0, 0, -5, 0, 1, 0, 0, 0, 0, 1, 4}, .custom_index = 77, .table_offset = 5, .mask = 1},
+                 {},
+                 {.transform = {2, 0, 0, 5, 0, 2, 0, 0, 0, 0, 3, 8}, .custom_index = 0xffffff, .mask = 0x82,
+                  .flags = InstanceFlags::flip_facing}});
+    const auto ray = [](float x, std::uint32_t mask) {
+        return Ray{.origin = {x, 0, -2}, .direction = {0, 0, 2}, .mask = mask};
+    };
+    const std::vector<Hit> hits = scene.trace({ray(-5, 0xff), ray(5, 0xff), ray(-5, 2), ray(5, 2), ray(5, 1), ray(0, 4), ray(20, 0xff)});
+    EXPECT_EQ(hits[0].type, 1u);
+    EXPECT_FLOAT_EQ(hits[0].t, 3.0f);
+    EXPECT_EQ(hits[0].instance, 0u);
+    EXPECT_EQ(hits[0].custom_index, 77u);
+    EXPECT_EQ(hits[0].table_offset, 5u);
+    // Counterclockwise as seen from +z, so clockwise from where the ray starts.
+    EXPECT_EQ(hits[0].front_face, 1u);
+    EXPECT_EQ(hits[1].type, 1u);
+    EXPECT_FLOAT_EQ(hits[1].t, 5.0f);
+    EXPECT_EQ(hits[1].instance, 2u);
+    EXPECT_EQ(hits[1].custom_index, 0xffffffu);
+    EXPECT_EQ(hits[1].front_face, 0u);
+    EXPECT_EQ(hits[2].type, 0u);
+    EXPECT_EQ(hits[3].type, 1u);
+    EXPECT_EQ(hits[4].type, 0u);
+    EXPECT_EQ(hits[5].type, 1u);
+    EXPECT_EQ(hits[5].instance, 1u);
+    EXPECT_EQ(hits[6].type, 0u);
+}
+
+TEST_P(RayQueries, UpdatesFollowTheVertices) {
+    SKIP_WITHOUT(capabilities().ray_query);
+    Mesh mesh = random_mesh(100, 9);
+    Scene scene(*this, mesh, true, true);
+    scene.build();
+    for (float& value : mesh.positions) value = value * 0.8f + 0.1f;
+    ok(device().write_buffer(scene.vertices, std::as_bytes(std::span(mesh.positions))));
+    CommandList list = device().create_command_list("update");
+    list.update_acceleration_structure(scene.bottom, std::array{GeometrySource{.vertices = scene.vertices}});
+    list.update_acceleration_structure(scene.top, std::array{AccelerationStructureInstance{.bottom_level = scene.bottom}});
+    run(std::move(list));
+    const std::vector<Ray> rays = random_rays(1000, 10);
+    expect_agreement(mesh, rays, scene.trace(rays), [](std::size_t, std::uint32_t, bool) { return true; });
+}
+
+TEST_P(RayQueries, StructuresWithoutContentAreNeverHit) {
+    SKIP_WITHOUT(capabilities().ray_query);
+    const std::vector<Ray> rays = random_rays(64, 11);
+    Scene scene(*this, random_mesh(100, 12, 1.0f));
+    scene.build({{.mask = 0}, {.transform = {}}});
+    for (const Hit& hit : scene.trace(rays)) EXPECT_EQ(hit.type, 0u);
+    CommandList list = device().create_command_list("empty");
+    list.build_acceleration_structure(scene.top, std::vector<AccelerationStructureInstance>{});
+    run(std::move(list));
+    for (const Hit& hit : scene.trace(rays)) EXPECT_EQ(hit.type, 0u);
+    const AccelerationStructure nothing = ok(device().create_acceleration_structure(
+        {.level = AccelerationStructureLevel::bottom, .geometries = {{}}, .name = "nothing"}));
+    list = device().create_command_list("nothing");
+    list.build_acceleration_structure(nothing, std::array{GeometrySource{}});
+    list.build_acceleration_structure(scene.top, std::array{AccelerationStructureInstance{.bottom_level = nothing}});
+    run(std::move(list));
+    for (const Hit& hit : scene.trace(rays)) EXPECT_EQ(hit.type, 0u);
+}
+
+TEST_P(RayQueries, VerticesAndRaysThatAreNoNumbersHitNothing) {
+    SKIP_WITHOUT(capabilities().ray_query);
+    Mesh mesh = random_mesh(100, 13);
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    // Every fourth triangle has a bad first vertex: the one whose NaN makes a triangle inactive everywhere.
+    for (std::size_t i = 0; i < mesh.positions.size(); i += 36) mesh.positions[i] = nan;
+    Scene scene(*this, mesh);
+    scene.build();
+    std::vector<Ray> rays = random_rays(1000, 14);
+    Mesh without = mesh;
+    for (std::size_t i = 0; i < mesh.positions.size(); i += 36) std::fill_n(without.positions.begin() + static_cast<std::ptrdiff_t>(i), 9, 0.0f);
+    expect_agreement(without, rays, scene.trace(rays), [](std::size_t, std::uint32_t p, bool) { return p % 4 != 0; });
+    if (!device().adapter().backend.starts_with("cpu")) return;  // Other devices may do as they like with such rays.
+    const float infinity = std::numeric_limits<float>::infinity();
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        if (i % 4 == 0) rays[i].origin[i % 3] = nan;
+        if (i % 4 == 1) rays[i].direction[i % 3] = infinity;
+        if (i % 4 == 2) rays[i].t_min = -1;
+        if (i % 4 == 3) rays[i].t_max = nan;
+    }
+    for (const Hit& hit : scene.trace(rays)) ASSERT_EQ(hit.type, 0u);
+}
+
+TEST_P(RayQueries, NoRaySlipsThroughSharedEdges) {
+    SKIP_WITHOUT(capabilities().ray_query);
+    // A closed fan around a point, hit exactly along its edges and at its vertices.
+    constexpr int spokes = 16;
+    Mesh mesh;
+    std::vector<std::array<float, 3>> rim;
+    for (int i = 0; i < spokes; ++i) {
+        const double angle = i * 2 * 3.14159265358979 / spokes;
+        rim.push_back({static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), 0.3f * static_cast<float>(i % 3)});
+    }
+    const std::array<float, 3> middle{0.01f, 0.02f, 0.1f};
+    for (int i = 0; i < spokes; ++i)
+        for (const auto& corner : {middle, rim[static_cast<std::size_t>(i)], rim[static_cast<std::size_t>((i + 1) % spokes)]})
+            mesh.positions.insert(mesh.positions.end(), corner.begin(), corner.end());
+    Scene scene(*this, mesh);
+    scene.build();
+    std::mt19937 random(15);
+    std::uniform_real_distribution<float> unit(0, 1);
+    std::vector<Ray> rays(4096);
+    for (Ray& ray : rays) {
+        const auto& corner = rim[random() % spokes];
+        const float along = 0.9f * unit(random);
+        ray.origin = {unit(random) - 0.5f, unit(random) - 0.5f, -3};
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            ray.direction[axis] = middle[axis] + along * (corner[axis] - middle[axis]) - ray.origin[axis];
+    }
+    std::size_t missed = 0;
+    for (const Hit& hit : scene.trace(rays)) missed += hit.type == 0;
+    EXPECT_EQ(missed, 0u);
+}
+
+TEST_P(RayQueries, ArraysOfQueriesAndMatricesWork) {
+    SKIP_WITHOUT(capabilities().ray_query);
+    Scene scene(*this, Mesh{{-1, -1, 0, 1, -1, 0, 0, 1, 0}});
+    scene.build({{.transform = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 4, 8}}});
+    const std::vector<Hit> hits = scene.trace(std::vector<Ray>(32, Ray{.origin = {0, 0, -2}, .direction = {0, 0, 1}}), declarations + R"(
+        void main() {
+            uint i = gl_GlobalInvocationID.x;
+            rayQueryEXT queries[2];
+            for (uint k = 0; k < 2; ++k)
+                rayQueryInitializeEXT(queries[k], scene, 0, 0xff, rays[i].origin + vec3(0, 0, k), 0, rays[i].direction, 100);
+            uint mine = i & 1;
+            while (rayQueryProceedEXT(queries[mine]));
+            mat4x3 world = rayQueryGetIntersectionObjectToWorldEXT(queries[mine], true);
+            mat4x3 object = rayQueryGetIntersectionWorldToObjectEXT(queries[mine], true);
+            vec3 origin = rayQueryGetIntersectionObjectRayOriginEXT(queries[mine], true);
+            hits[i].a = uvec4(rayQueryGetIntersectionTypeEXT(queries[mine], true),
+                              floatBitsToUint(rayQueryGetIntersectionTEXT(queries[mine], true)),
+                              uint(world[3].z), uint(world[0].x));
+            hits[i].b = uvec4(uint(object[2].z * 100), uint(-object[3].z), uint(-origin.z * 100),
+                              uint(rayQueryGetRayFlagsEXT(queries[mine])));
+            hits[i].c = uvec4(0);
+        })");
+    for (std::uint32_t i = 0; i < 32; ++i) {
+        EXPECT_EQ(hits[i].type, 1u);
+        EXPECT_FLOAT_EQ(hits[i].t, i % 2 ? 9.0f : 10.0f);
+        EXPECT_EQ(hits[i].primitive, 8u);
+        EXPECT_EQ(hits[i].geometry, 2u);
+        EXPECT_EQ(hits[i].instance, 25u);
+        EXPECT_EQ(hits[i].custom_index, 2u);
+        EXPECT_EQ(hits[i].table_offset, i % 2 ? 225u : 250u);
+        EXPECT_EQ(hits[i].front_face, 0u);
+    }
 }
 
 }  // namespace
