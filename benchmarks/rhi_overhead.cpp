@@ -301,7 +301,7 @@ int run(int rounds, bool verbose) {
 }  // namespace nacre
 
 int main(int count, char** arguments) {
-    int rounds = 31;
+    int rounds = 121;
     bool verbose = false;
     for (int i = 1; i < count; ++i) {
         const std::string argument = arguments[i];

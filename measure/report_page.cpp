@@ -94,11 +94,12 @@ Expected<std::string> pictures_html(const std::vector<ReportPicture>& pictures, 
 }
 
 constexpr std::string_view viewer_html = R"(<h2>Compare</h2>
-<p class="note">Drag to move the border, turn the wheel to zoom, hold Shift and drag to pan, press F to swap the two.
-Click a picture below to see it on the right.</p>
+<p class="note">Drag to move the border (or use the arrow keys), turn the wheel to zoom, hold Shift and drag to pan, press F to swap the
+two. Click a picture below to see it on the right.</p>
 <div class="viewer"><div class="controls"><label>left <select></select></label><label>right <select></select></label>
 <button class="flip">swap (F)</button><button class="reset">reset</button></div>
-<div class="stage" style="--at:50%"><img alt="left picture"><div class="over"><img alt="right picture"></div>
+<div class="stage" style="--at:50%" tabindex="0" role="slider" aria-label="border between the two pictures, percent"
+aria-valuemin="0" aria-valuemax="100" aria-valuenow="50"><img alt="left picture"><div class="over"><img alt="right picture"></div>
 <div class="handle"></div><div class="tag a"></div><div class="tag b"></div></div></div>
 )";
 

@@ -1,4 +1,4 @@
-// Lays two pictures of the page over each other: drag to move the border, wheel to zoom, F to flip.
+// Lays two pictures of the page over each other: drag or arrow keys to move the border, wheel to zoom, F to flip.
 (() => {
   const stage = document.querySelector('.stage');
   if (!stage) return;
@@ -24,13 +24,21 @@
     for (const image of [below, above]) image.style.transform = `translate(${x}px, ${y}px) scale(${zoom})`;
     stage.classList.toggle('zoomed', zoom > 1);
   };
+  let border = 0.5;
+  const set_border = share => {
+    border = Math.min(1, Math.max(0, share));
+    stage.style.setProperty('--at', `${border * 100}%`);
+    stage.setAttribute('aria-valuenow', Math.round(border * 100));
+  };
   const divide = event => {
     const box = stage.getBoundingClientRect();
-    const share = Math.min(1, Math.max(0, (event.clientX - box.left) / box.width));
-    stage.style.setProperty('--at', `${share * 100}%`);
+    set_border((event.clientX - box.left) / box.width);
   };
   let drag = null;
+  // Browsers would drag the picture itself, and take the pointer away.
+  stage.addEventListener('dragstart', event => event.preventDefault());
   stage.addEventListener('pointerdown', event => {
+    if (event.button !== 0) return;
     stage.setPointerCapture(event.pointerId);
     drag = event.shiftKey ? [event.clientX - x, event.clientY - y] : [];
     if (!drag.length) divide(event);
@@ -39,7 +47,13 @@
     if (!drag) return;
     if (drag.length) { x = event.clientX - drag[0]; y = event.clientY - drag[1]; place(); } else divide(event);
   });
-  stage.addEventListener('pointerup', () => { drag = null; });
+  for (const end of ['pointerup', 'pointercancel']) stage.addEventListener(end, () => { drag = null; });
+  stage.addEventListener('keydown', event => {
+    const step = {ArrowLeft: -0.01, ArrowRight: 0.01}[event.key];
+    if (!step) return;
+    event.preventDefault();
+    set_border(border + step * (event.shiftKey ? 10 : 1));
+  });
   stage.addEventListener('wheel', event => {
     event.preventDefault();
     const box = stage.getBoundingClientRect();
@@ -52,9 +66,11 @@
   const flip = () => { [left.selectedIndex, right.selectedIndex] = [right.selectedIndex, left.selectedIndex]; show(); };
   document.querySelector('button.flip').addEventListener('click', flip);
   document.querySelector('button.reset').addEventListener('click', () => {
-    zoom = 1; x = y = 0; place(); stage.style.setProperty('--at', '50%');
+    zoom = 1; x = y = 0; place(); set_border(0.5);
   });
-  document.addEventListener('keydown', event => { if (event.key === 'f' || event.key === 'F') flip(); });
+  document.addEventListener('keydown', event => {
+    if ((event.key === 'f' || event.key === 'F') && event.target.tagName !== 'SELECT') flip();
+  });
   left.addEventListener('change', show);
   right.addEventListener('change', show);
   for (const image of images) image.addEventListener('click', () => {

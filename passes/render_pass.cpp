@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "passes/render_pass.h"
 
-#include <algorithm>
 #include <fmt/format.h>
+
+#include <algorithm>
 #include <map>
+#include <optional>
 #include <tuple>
 
 namespace nacre::passes {
@@ -12,7 +14,7 @@ using rhi::ResourceUse;
 
 Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPassDesc& desc,
                                       std::vector<std::uint32_t> draws, bool keep_order) {
-    device_ = &context.device;
+    shaders_ = &context.shaders;
     geometry_ = &context.geometry;
     materials_ = &context.materials;
     uses_materials_ = !desc.fragment_shader.empty();
@@ -31,13 +33,13 @@ Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPass
         rhi::GraphicsPipelineDesc pipeline;
         std::vector<rhi::ShaderDefine> defines = vertex_defines(key.features);
         defines.insert(defines.end(), desc.defines.begin(), desc.defines.end());
-        NACRE_TRY(pipeline.vertex, context.shaders.get(desc.name, {.path = desc.vertex_shader, .defines = defines}));
+        const rhi::ShaderSource vertex{.path = desc.vertex_shader, .defines = std::move(defines)};
+        std::optional<rhi::ShaderSource> fragment;
         pipeline.bind_group_layouts = {desc.frame_layout};
         if (uses_materials_) {
             defines = fragment_defines(key.features);
             defines.insert(defines.end(), desc.defines.begin(), desc.defines.end());
-            NACRE_TRY(pipeline.fragment,
-                      context.shaders.get(desc.name, {.path = desc.fragment_shader, .defines = defines}));
+            fragment = rhi::ShaderSource{.path = desc.fragment_shader, .defines = std::move(defines)};
             pipeline.bind_group_layouts.push_back(context.materials.layout(draw.material));
         }
         SceneGeometry::describe_vertices(key.features.attributes, pipeline);
@@ -46,8 +48,9 @@ Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPass
         pipeline.depth_stencil = desc.depth_stencil;
         pipeline.color_targets = desc.color_targets;
         pipeline.name = desc.name;
-        NACRE_TRY(const rhi::GraphicsPipeline handle, context.device.create_graphics_pipeline(pipeline));
-        pipelines_.push_back(handle);
+        NACRE_TRY(const rhi::ReloadableGraphicsPipeline made,
+                  context.shaders.graphics_pipeline(desc.name, pipeline, vertex, fragment));
+        pipelines_.push_back(made);
         return known.emplace(key, static_cast<std::uint32_t>(pipelines_.size() - 1)).first->second;
     };
 
@@ -84,7 +87,7 @@ void GeometryDraws::record_item(rhi::CommandList& list, const Item& item, rhi::B
                                 std::uint32_t& bound_material) const {
     const Draw& draw = geometry_->draws()[item.draw];
     if (pipeline != bound_pipeline) {
-        list.set_pipeline(pipelines_[pipeline]);
+        list.set_pipeline(shaders_->get(pipelines_[pipeline]));
         list.set_bind_group(0, frame_group);
         bound_pipeline = pipeline;
         bound_material = ~0u;
@@ -113,10 +116,6 @@ void GeometryDraws::record_one(rhi::CommandList& list, rhi::BindGroup frame_grou
     } else {
         record_item(list, *item, frame_group, item->pipeline, pipeline, material);
     }
-}
-
-GeometryDraws::~GeometryDraws() {
-    for (const rhi::GraphicsPipeline pipeline : pipelines_) device_->destroy(pipeline);
 }
 
 void uses_geometry(PassDeclaration& pass, const RenderContext& context, const GeometryPassDesc& desc,
@@ -197,23 +196,22 @@ rhi::ShaderDefine lit_format_define(const Decisions& decisions) {
 Expected<void> ComputeStep::prepare(RenderContext& context, const std::string& pass, const rhi::ShaderSource& source,
                                     std::uint32_t set, std::vector<rhi::BindGroupEntry> entries,
                                     std::vector<rhi::BindGroupLayout> layouts) {
-    NACRE_TRY(const rhi::Shader shader, context.shaders.get(pass, source));
-    NACRE_TRY(pipeline, context.device.create_compute_pipeline(
-                            {.shader = shader, .bind_group_layouts = std::move(layouts), .name = source.path}));
-    NACRE_TRY(const rhi::BindGroupLayout layout, context.device.bind_group_layout(pipeline, set));
+    shaders = &context.shaders;
+    NACRE_TRY(pipeline, context.shaders.compute_pipeline(
+                            pass, {.bind_group_layouts = std::move(layouts), .name = source.path}, source));
+    NACRE_TRY(const rhi::BindGroupLayout layout, context.device.bind_group_layout(context.shaders.get(pipeline), set));
     group_index = set;
     NACRE_TRY(group, context.device.create_bind_group({.layout = layout, .entries = std::move(entries), .name = pass}));
     return {};
 }
 
 void ComputeStep::bind(rhi::CommandList& list) const {
-    list.set_pipeline(pipeline);
+    list.set_pipeline(shaders->get(pipeline));
     list.set_bind_group(group_index, group);
 }
 
 void ComputeStep::destroy(rhi::Device& device) {
     if (group) device.destroy(group);
-    if (pipeline) device.destroy(pipeline);
 }
 
 }  // namespace nacre::passes

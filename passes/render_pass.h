@@ -104,7 +104,6 @@ class GeometryDraws {
     GeometryDraws() = default;
     GeometryDraws(const GeometryDraws&) = delete;
     GeometryDraws& operator=(const GeometryDraws&) = delete;
-    ~GeometryDraws();
 
     /// `draws`: indices into the geometry's draws; their order is kept when `keep_order`.
     Expected<void> prepare(RenderContext& context, const GeometryPassDesc& desc, std::vector<std::uint32_t> draws,
@@ -124,11 +123,11 @@ class GeometryDraws {
     void record_item(rhi::CommandList& list, const Item& item, rhi::BindGroup frame_group, std::uint32_t pipeline,
                      std::uint32_t& bound_pipeline, std::uint32_t& bound_material) const;
 
-    rhi::Device* device_ = nullptr;
+    const ShaderLibrary* shaders_ = nullptr;
     const SceneGeometry* geometry_ = nullptr;
     const SceneMaterials* materials_ = nullptr;
     bool uses_materials_ = false;
-    std::vector<rhi::GraphicsPipeline> pipelines_;
+    std::vector<rhi::ReloadableGraphicsPipeline> pipelines_;
     std::vector<Item> items_;
 };
 
@@ -166,13 +165,15 @@ rhi::ShaderDefine lit_format_define(const Decisions& decisions);
 
 /// A compute shader with its own bind group.
 struct ComputeStep {
-    rhi::ComputePipeline pipeline{};
+    const ShaderLibrary* shaders = nullptr;
+    rhi::ReloadableComputePipeline pipeline{};
     rhi::BindGroup group{};
     std::uint32_t group_index = 0;
     /// Set 0 is `context.lighting_group` where `lit`.
     Expected<void> prepare(RenderContext& context, const std::string& pass, const rhi::ShaderSource& source,
                            std::uint32_t set, std::vector<rhi::BindGroupEntry> entries,
                            std::vector<rhi::BindGroupLayout> layouts = {});
+    /// Sets the pipeline and the step's own group.
     void bind(rhi::CommandList& list) const;
     void destroy(rhi::Device& device);
 };

@@ -265,7 +265,7 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
 /// What several passes read: camera, lights, tables, environment.
 Expected<void> Renderer::State::make_shared_objects(const scene::Scene& scene) {
     handles_made = true;
-    shaders = std::make_unique<ShaderLibrary>(device, options.cache);
+    shaders = std::make_unique<ShaderLibrary>(device, options.cache, options.shader_folder);
     const scene::Environment& sky = options.environment != nullptr ? *options.environment : scene.environment;
     NACRE_TRY(environment, PreparedEnvironment::create(device, *shaders, sky, profile->environment_size,
                                                        profile->environment_samples));
@@ -522,6 +522,7 @@ Expected<std::unique_ptr<Renderer>> Renderer::create(rhi::Device& device, const 
     state->options = options;
     NACRE_TRY(const scene::Camera* camera, choose_camera(scene, options.camera));
     state->view = *camera;
+    if (!options.shader_folder.empty()) NACRE_CHECK(ShaderLibrary::check_folder(options.shader_folder));
     NACRE_CHECK(state->decide(scene));
     NACRE_CHECK(state->make_shared_objects(scene));
     NACRE_CHECK(state->make_passes());
@@ -530,6 +531,8 @@ Expected<std::unique_ptr<Renderer>> Renderer::create(rhi::Device& device, const 
     state->options.environment = nullptr;
     return std::unique_ptr<Renderer>(new Renderer(std::move(state)));
 }
+
+std::vector<rhi::PipelineReload> Renderer::reload_shaders() { return state_->shaders->reload_changed(); }
 
 void Renderer::set_camera(const scene::Camera& camera) { state_->view = camera; }
 

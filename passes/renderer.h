@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <span>
@@ -16,6 +17,7 @@
 #include "passes/gbuffer_layout.h"
 #include "passes/plan.h"
 #include "rhi/device.h"
+#include "rhi/pipeline_reloader.h"
 #include "scene/scene.h"
 
 /// @file
@@ -67,6 +69,9 @@ struct RenderOptions {
     std::vector<std::string> keep;            ///< As above for these names only.
     Feature without = Feature::none;
     DiskCache* cache = nullptr;               ///< For compiled shaders; null: nothing is kept.
+    /// Root of a source tree whose shaders are used in place of those in the program, and followed by `reload_shaders`;
+    /// empty: that of NACRE_SHADER_DIR, if any.
+    std::filesystem::path shader_folder;
 };
 
 struct PassTime {
@@ -106,8 +111,9 @@ struct FinalPicture {
 
 class Renderer {
   public:
-    /// Uploads the scene, compiles shaders, prepares the environment's tables. Errors: not_found (profile, camera),
-    /// unsupported (the device cannot hold the profile; the text names the limit), out_of_memory, shader_compile, device_lost.
+    /// Uploads the scene, compiles shaders, prepares the environment's tables. Errors: not_found (profile, camera,
+    /// shader folder), unsupported (the device cannot hold the profile; the text names the limit), out_of_memory,
+    /// shader_compile, device_lost.
     static Expected<std::unique_ptr<Renderer>> create(rhi::Device& device, const scene::Scene& scene,
                                                       const RenderOptions& options = {});
     ~Renderer();
@@ -116,6 +122,12 @@ class Renderer {
 
     /// Renders one frame and waits for it.
     Expected<FrameStatistics> render_frame();
+    /// Looks for changes of the shaders' files ("hot reload"; call it between frames) and makes the pipelines anew that
+    /// they concern, from the next frame on. One entry for each pass and outcome, none where nothing changed. A shader
+    /// that does not compile is reported once, with file and line, and leaves the old pipeline in use. Shaders that
+    /// prepare the environment have run by then: that a change does not show is reported as unsupported. The plan stays
+    /// that of `create`.
+    std::vector<rhi::PipelineReload> reload_shaders();
     /// Sees the scene from elsewhere, from the next frame on.
     void set_camera(const scene::Camera& camera);
 

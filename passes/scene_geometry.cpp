@@ -129,6 +129,7 @@ Expected<std::unique_ptr<SceneGeometry>> SceneGeometry::create(rhi::Device& devi
                                               : attribute_content(drawn, static_cast<Attribute>(a)));
                 }
             }
+            if (shared.draw.index_count == 0) continue;
             // Mirrored places need the other winding; blended ones are sorted one by one.
             for (const bool mirrored : {false, true}) {
                 Draw draw = shared.draw;
@@ -159,13 +160,12 @@ Expected<std::unique_ptr<SceneGeometry>> SceneGeometry::create(rhi::Device& devi
         const rhi::BufferDesc desc{
             .size = content.size(), .usage = usage | rhi::BufferUsage::copy_destination, .name = name};
         NACRE_TRY(buffer, device.create_buffer(desc));
-        NACRE_CHECK(device.write_buffer(buffer, std::span<const std::byte>(content)));
         result->all_buffers_.push_back({buffer, desc,
                                         rhi::has_any(usage, rhi::BufferUsage::index) ? rhi::ResourceUse::index_buffer
                                                                                      : rhi::ResourceUse::vertex_buffer,
                                         attribute});
         result->bytes_ += content.size();
-        return {};
+        return device.write_buffer(buffer, std::span<const std::byte>(content));
     };
     for (std::uint32_t a = 0; a < attribute_count; ++a) {
         NACRE_CHECK(upload(result->attributes_[a], attributes[a], rhi::BufferUsage::vertex, attribute_names[a], a));

@@ -71,22 +71,41 @@ struct PipelineReloader::State {
         return count;
     }
 
-    /// Bind groups made for the old pipeline must fit the new one. (Equal layouts are one object.)
+    /// Bytes of push constants that the shaders take.
+    [[nodiscard]] std::uint32_t push_constant_bytes(const std::vector<Shader>& shaders) const {
+        std::uint32_t bytes = 0;
+        for (const Shader shader : shaders) {
+            if (const auto reflection = device.reflection(shader))
+                bytes = std::max(bytes, reflection->push_constant_bytes);
+        }
+        return bytes;
+    }
+
+    /// What the program binds and pushes for the old pipeline must fit the new one. (Equal layouts are one object.)
     template <typename Item, typename Pipeline>
-    Expected<void> check_layouts(const Item& before, Pipeline after, const std::vector<Shader>& shaders) const {
-        // Explicit layouts stay; making the pipeline has checked that the shaders fit them.
-        if (!before.desc.bind_group_layouts.empty()) return {};
+    Expected<void> check_interface(const Item& before, Pipeline after, const std::vector<Shader>& shaders) const {
+        const auto unfit = [&](std::string reason) {
+            return fail(ErrorCode::unsupported, "reload pipeline", fmt::format("'{}'", before.desc.name),
+                        std::move(reason), "Undo that change, or start the program again.");
+        };
+        const std::vector<BindGroupLayout>& given = before.desc.bind_group_layouts;
         const std::uint32_t old_count = set_count(before.shaders), new_count = set_count(shaders);
         for (std::uint32_t set = 0; set < std::max(old_count, new_count); ++set) {
+            // Explicit layouts stay; making the pipeline has checked that the shaders fit them.
+            if (set < given.size() && given[set]) continue;
             if (set < std::min(old_count, new_count)) {
                 NACRE_TRY(const BindGroupLayout old_layout, device.bind_group_layout(before.pipeline, set));
                 NACRE_TRY(const BindGroupLayout new_layout, device.bind_group_layout(after, set));
                 if (old_layout == new_layout) continue;
             }
-            return fail(ErrorCode::unsupported, "reload pipeline", fmt::format("'{}'", before.desc.name),
-                        fmt::format("the bindings of set {} have changed, so bind groups in use no longer fit", set),
-                        "Undo that change, or start the program again.");
+            return unfit(fmt::format("the bindings of set {} have changed, so bind groups in use no longer fit", set));
         }
+        const std::uint32_t old_bytes = push_constant_bytes(before.shaders), new_bytes = push_constant_bytes(shaders);
+        if (old_bytes != new_bytes)
+            return unfit(
+                fmt::format("its push constants have grown or shrunk from {} to {} bytes, which is not what the "
+                            "program pushes",
+                            old_bytes, new_bytes));
         return {};
     }
 
@@ -99,7 +118,7 @@ struct PipelineReloader::State {
             return std::unexpected(pipeline.error());
         }
         if (item.pipeline) {
-            if (auto fits = check_layouts(item, *pipeline, shaders); !fits) {
+            if (auto fits = check_interface(item, *pipeline, shaders); !fits) {
                 device.destroy(*pipeline);
                 destroy(device, shaders);
                 return fits;

@@ -21,8 +21,9 @@
 ///         if (reload.error) show(reload.error->message());              // the old pipeline goes on working
 ///     list.set_pipeline(pipelines.get(sky));
 ///
-/// A file that does not compile, or that changes the bindings (bind groups in use would no longer fit), is
-/// reported once and leaves the old pipeline as it is; the next change of the file is tried again.
+/// A file that does not compile, or that changes the bindings or the size of the push constants (what the program
+/// binds and pushes would no longer fit), is reported once and leaves the old pipeline as it is; the next change of the
+/// file is tried again.
 
 namespace nacre::rhi {
 

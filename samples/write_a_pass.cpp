@@ -94,7 +94,12 @@ Expected<void> draw(const std::string& backend, const std::string& file) {
 }  // namespace
 
 int main(int count, char** arguments) {
-    const auto result = draw(count > 1 ? arguments[1] : "auto", count > 2 ? arguments[2] : "vignette.png");
-    if (!result) std::fprintf(stderr, "write_a_pass: %s\n", result.error().message().c_str());
-    return result ? 0 : 1;
+    const std::string file = count > 2 ? arguments[2] : "vignette.png";
+    const auto result = draw(count > 1 ? arguments[1] : "auto", file);
+    if (!result) {
+        std::fprintf(stderr, "write_a_pass: %s\n", result.error().message().c_str());
+        return 1;
+    }
+    std::printf("wrote %s\n", file.c_str());
+    return 0;
 }

@@ -8,7 +8,9 @@ namespace nacre::gl {
 
 void set_driver_environment() {
     static std::once_flag once;
-    std::call_once(once, [] { ::setenv("GALLIVM_PERF", "no_quad_lod,no_aos_sampling", /*overwrite=*/0); });
+    std::call_once(once, [] {
+        ::setenv("GALLIVM_PERF", "no_quad_lod,no_aos_sampling,no_brilinear,no_rho_approx", /*overwrite=*/0);
+    });
 }
 
 Quirks find_quirks(std::string_view renderer, std::string_view) {

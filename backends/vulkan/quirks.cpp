@@ -9,7 +9,7 @@ namespace nacre::vulkan {
 namespace {
 
 constexpr EnvironmentQuirk environment_list[] = {
-    {"GALLIVM_PERF", "no_quad_lod,no_aos_sampling",
+    {"GALLIVM_PERF", "no_quad_lod,no_aos_sampling,no_brilinear,no_rho_approx",
      "lavapipe's default texture filter takes one level of detail for a quad of pixels and filters 8-bit textures in "
      "8-bit arithmetic; neither conforms, and pictures would differ from other devices'"},
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 460
 // Lays one group of blended surfaces over the picture, for devices that cannot blend into float targets.
+#include "passes/shared/half.glsl"
 #include "passes/shared/shared_exponent.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -14,5 +15,5 @@ void main() {
     if (any(greaterThanEqual(pixel, textureSize(below, 0)))) return;
     vec3 color = unpack_shared_exponent(texelFetch(group_color, pixel, 0).r);
     float coverage = float(texelFetch(group_coverage, pixel, 0).r) / 65535.0;
-    imageStore(lit, pixel, vec4(min(color + (1.0 - coverage) * texelFetch(below, pixel, 0).rgb, vec3(65504.0)), 1.0));
+    imageStore(lit, pixel, vec4(round_to_half(min(color + (1.0 - coverage) * texelFetch(below, pixel, 0).rgb, vec3(65504.0))), 1.0));
 }

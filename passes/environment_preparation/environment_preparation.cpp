@@ -42,7 +42,7 @@ struct Step {
 Expected<Step> make_step(Temporary& temporary, ShaderLibrary& shaders, const std::string& pass,
                          const rhi::ShaderSource& source, std::vector<rhi::BindGroupEntry> entries) {
     Step step;
-    NACRE_TRY(const rhi::Shader shader, shaders.get(pass, source));
+    NACRE_TRY(const rhi::Shader shader, shaders.shader_for_once(pass, source));
     if (const auto known = temporary.pipelines.find(source.path); known != temporary.pipelines.end()) {
         step.pipeline = known->second;
     } else {

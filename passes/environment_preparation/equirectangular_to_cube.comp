@@ -3,6 +3,7 @@
 // A mip of the environment cube from an equirectangular picture with mips.
 #include "passes/shared/cube.glsl"
 #include "passes/shared/ggx.glsl"
+#include "passes/shared/half.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0) uniform sampler2D equirectangular;
@@ -23,5 +24,5 @@ void main() {
     // A texel of the cube covers this many of the picture; explicit, since compute shaders have no derivatives.
     float lod = max(log2(float(textureSize(equirectangular, 0).x) / float(4 * size)), 0.0);
     vec3 light = textureLod(equirectangular, uv, lod).rgb * parameters.y;
-    imageStore(cube, texel, vec4(clamp(light, vec3(0.0), vec3(65504.0)), 1.0));
+    imageStore(cube, texel, vec4(round_to_half(clamp(light, vec3(0.0), vec3(65504.0))), 1.0));
 }

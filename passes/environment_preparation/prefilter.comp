@@ -5,6 +5,7 @@
 // Sources: Karis 2013, "Real shading in Unreal Engine 4"; Krivanek and Colbert 2008 for the mips.
 #include "passes/shared/cube.glsl"
 #include "passes/shared/ggx.glsl"
+#include "passes/shared/half.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0) uniform samplerCube environment;
@@ -51,5 +52,5 @@ void main() {
         sum += textureLod(environment, l, lod).rgb * cos_l;
         weight += cos_l;
     }
-    imageStore(mip, texel, vec4(min(sum / max(weight, 1e-6), vec3(65504.0)), 1.0));
+    imageStore(mip, texel, vec4(round_to_half(min(sum / max(weight, 1e-6), vec3(65504.0))), 1.0));
 }

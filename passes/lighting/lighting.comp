@@ -3,6 +3,7 @@
 // Lights the tiles of one list. SLAB, UNLIT: what pixels of these tiles can hold. TILE_LIST: which list.
 // EMISSION_TARGET: emission was drawn into an integer target and is added here.
 #include "passes/shared/gbuffer_fields.glsl"
+#include "passes/shared/half.glsl"
 #include "passes/shared/shared_exponent.glsl"
 #include "passes/tile_classification/tiles.glsl"
 #ifdef SLAB
@@ -55,5 +56,5 @@ void main() {
 #ifdef EMISSION_TARGET
     color = min(color + unpack_shared_exponent(texelFetch(emission, pixel, 0).r), vec3(65504.0));
 #endif
-    imageStore(lit, pixel, vec4(color, 1.0));
+    imageStore(lit, pixel, vec4(round_to_half(color), 1.0));
 }

@@ -45,9 +45,8 @@ class Lighting final : public RenderPass {
         }
         pass.records([this](PassContext& frame) {
             for (const Step& step : steps_) {
-                frame.list.set_pipeline(step.compute.pipeline);
+                step.compute.bind(frame.list);
                 if (step.list.slab) frame.list.set_bind_group(0, group_);
-                frame.list.set_bind_group(1, step.compute.group);
                 frame.list.dispatch_indirect(frame.buffer(resources_.tile_lists), tile_list_bytes * step.list.index);
             }
         });

@@ -3,6 +3,7 @@
 // The environment where no surface is seen.
 #include "passes/shared/camera.glsl"
 #include "passes/shared/gbuffer_fields.glsl"
+#include "passes/shared/half.glsl"
 #include "passes/tile_classification/tiles.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -21,5 +22,5 @@ void main() {
     ivec2 pixel = ivec2(tile & 0xffffu, tile >> 16) * 8 + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(pixel, size))) return;
     if (unpack_pixel_class(texelFetch(material_0, pixel, 0).r) != 0u) return;
-    imageStore(lit, pixel, vec4(textureLod(environment, view_ray(pixel), 0.0).rgb, 1.0));
+    imageStore(lit, pixel, vec4(round_to_half(textureLod(environment, view_ray(pixel), 0.0).rgb), 1.0));
 }

@@ -22,9 +22,8 @@ class Sky final : public RenderPass {
             .uses(resources_.lit, ResourceUse::storage_write);
         uses_lighting(pass, resources_);
         pass.records([this](PassContext& frame) {
-            frame.list.set_pipeline(step_.pipeline);
+            step_.bind(frame.list);
             frame.list.set_bind_group(0, group_);
-            frame.list.set_bind_group(1, step_.group);
             frame.list.dispatch_indirect(frame.buffer(resources_.tile_lists), 3 * 16);
         });
     }

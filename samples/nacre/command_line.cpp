@@ -53,6 +53,7 @@ Examples:
   nacre render car.gltf -o car.exr --env studio.hdr --camera Front
   nacre render car.gltf -o car.png --exposure -1.5 --frames 20 --json times.json
   nacre render car.gltf -o car.png --dump depth     also writes car.depth.png (car.depth.exr beside an .exr)
+  nacre render car.gltf -o car.png --watch ~/nacre  edit the shaders below ~/nacre/passes and look at car.png
 )";
 
 constexpr const char* compare_footer = R"(
@@ -308,6 +309,12 @@ struct Definition {
         add_picture(*command, render.scene);
         add_output_options(*command, render.scene, "Also write this texture that passes hand on, beside the picture");
         add_dump_graph(*command, render.scene);
+        command
+            ->add_option("--watch", render.scene.watch,
+                         "Take the shaders from this source folder; render again whenever one of them changes, until "
+                         "Ctrl-C")
+            ->type_name("FOLDER")
+            ->group("Output");
         add_json(*command, render.scene.json);
 
         command = app.add_subcommand("compare", "Render a scene on several backends and compare every texture");

@@ -31,6 +31,7 @@ struct SceneArguments {
     std::optional<float> time;                  ///< Seconds into the animation; empty: the pose at rest.
     std::string dump;                           ///< An intermediate texture; empty: none.
     std::string dump_graph;                     ///< Path of a .svg or .dot; empty: none.
+    std::string watch;                          ///< Root of a source tree whose shaders are followed; empty: none.
     bool driver_validation = false;
     std::string json;                           ///< Path, "-" for standard output; empty: none.
 };

@@ -17,6 +17,7 @@
 #include "samples/nacre/output.h"
 #include "samples/nacre/session.h"
 #include "samples/nacre/text_table.h"
+#include "samples/nacre/watch.h"
 
 namespace nacre::command {
 namespace {
@@ -80,14 +81,10 @@ Expected<std::filesystem::path> write_dump(passes::Renderer& renderer, const std
     return path;
 }
 
-}  // namespace
-
-Outcome run(const RenderArguments& arguments) {
+// Renders, writes every file that was asked for, and says so.
+Expected<void> render_and_write(const SceneSession& scene, const RenderSession& session,
+                                const RenderArguments& arguments) {
     const bool is_exr = arguments.output.ends_with(".exr");
-    NACRE_TRY(const SceneSession scene, SceneSession::open(arguments.scene));
-    const auto instance = make_instance();
-    NACRE_TRY(const RenderSession session,
-              scene.start(*instance, arguments.scene.backends.front(), is_exr && arguments.scene.dump.empty()));
     passes::Renderer& renderer = *session.renderer;
     measure::FrameTimes times;
     {
@@ -120,11 +117,26 @@ Outcome run(const RenderArguments& arguments) {
     NACRE_CHECK(write_graph(renderer, arguments.scene.dump_graph));
     print_result(arguments.scene.json, text);
     const double luminance = measure::median_luminance(picture.exposed);
-    NACRE_CHECK(write_json(arguments.scene.json,
-                           json_of(session, arguments, times, luminance, warnings)
-                                   .dump(2, ' ', false, Json::error_handler_t::replace) +
-                               "\n"));
+    return write_json(
+        arguments.scene.json,
+        json_of(session, arguments, times, luminance, warnings).dump(2, ' ', false, Json::error_handler_t::replace) +
+            "\n");
+}
+
+}  // namespace
+
+Outcome run(const RenderArguments& arguments) {
+    const bool is_exr = arguments.output.ends_with(".exr");
+    NACRE_TRY(const SceneSession scene, SceneSession::open(arguments.scene));
+    const auto instance = make_instance();
+    NACRE_TRY(const RenderSession session,
+              scene.start(*instance, arguments.scene.backends.front(), is_exr && arguments.scene.dump.empty()));
+    const auto render = [&] { return render_and_write(scene, session, arguments); };
+    NACRE_CHECK(render());
     NACRE_CHECK(check_messages(session));
+    if (!arguments.scene.watch.empty()) {
+        NACRE_CHECK(watch_shaders(*session.renderer, arguments.scene.watch, render));
+    }
     return ExitCode::success;
 }
 

@@ -101,7 +101,8 @@ Attempt<RenderSession> SceneSession::start(const rhi::Instance& instance, const 
                                   .camera = arguments_.camera,
                                   .exposure_ev = arguments_.exposure_ev,
                                   .keep_intermediates = keep_intermediates,
-                                  .cache = cache_.get()};
+                                  .cache = cache_.get(),
+                                  .shader_folder = arguments_.watch};
     if (arguments_.tone_mapping == "linear") options.tone_mapping = passes::ToneMapping::linear;
     if (!arguments_.dump.empty()) options.keep.push_back(arguments_.dump);
     NACRE_TRY(session.renderer, passes::Renderer::create(*session.device, *scene_, options));

@@ -206,7 +206,7 @@ TEST_F(ImageTest, RadianceOldRunsAreDecoded) {
 TEST_F(ImageTest, EnvironmentsOfTheAssetsAreRead) {
     const char* assets = std::getenv("NACRE_ASSETS");
     const std::filesystem::path path =
-        std::filesystem::path(assets ? assets : "../shared/assets") / "hdr/venice_sunset_1k.hdr";
+        std::filesystem::path(assets ? assets : NACRE_SOURCE_DIR "/../shared/assets") / "hdr/venice_sunset_1k.hdr";
     if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << path;
     const auto image = read_image(path);
     ASSERT_TRUE(image) << image.error().message();

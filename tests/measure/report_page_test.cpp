@@ -42,6 +42,7 @@ TEST(ReportPageTest, HoldsEverythingItself) {
     EXPECT_THAT(*html, HasSubstr("src=\"data:image/png;base64,iVBORw0KGgo"));
     EXPECT_THAT(*html, HasSubstr("clip-path"));        // the style
     EXPECT_THAT(*html, HasSubstr("querySelector"));    // the script
+    EXPECT_THAT(*html, HasSubstr("'dragstart'"));      // else browsers drag the picture and not the border
     EXPECT_THAT(*html, Not(HasSubstr("http://")));
     EXPECT_THAT(*html, Not(HasSubstr("https://")));
     EXPECT_THAT(*html, Not(HasSubstr("<link")));

@@ -73,6 +73,10 @@ class RendererTest : public ::testing::TestWithParam<RenderVariant> {
     rhi::Device* device_ = nullptr;
 };
 
+/// Another device of a variant, without the driver's validation, that fails as told.
+Expected<std::unique_ptr<rhi::Device>> make_failing_device(const RenderVariant& variant,
+                                                           const rhi::FaultInjection& faults);
+
 /// Destroys the devices, before the static objects of drivers and layers go.
 void release_devices();
 /// Messages that a device has given so far.

@@ -24,7 +24,7 @@ class Counter : public ::testing::EmptyTestEventListener {
 
 int main(int argc, char** argv) {
     // llvmpipe's default filter is not conformant; this has to be known before it is loaded.
-    setenv("GALLIVM_PERF", "no_quad_lod,no_aos_sampling", 1);
+    setenv("GALLIVM_PERF", "no_quad_lod,no_aos_sampling,no_brilinear,no_rho_approx", 1);
     ::testing::InitGoogleTest(&argc, argv);
     auto* counter = new Counter;
     ::testing::UnitTest::GetInstance()->listeners().Append(counter);

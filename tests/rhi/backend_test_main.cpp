@@ -137,7 +137,7 @@ std::string read_text(const std::string& path) {
 
 int run(int argc, char** argv) {
     // llvmpipe's default filter is not conformant; this has to be known before it is loaded.
-    setenv("GALLIVM_PERF", "no_quad_lod,no_aos_sampling", 1);
+    setenv("GALLIVM_PERF", "no_quad_lod,no_aos_sampling,no_brilinear,no_rho_approx", 1);
     ::testing::InitGoogleTest(&argc, argv);
     bool update = false;
     for (int i = 1; i < argc; ++i) update |= std::string(argv[i]) == "--update-support";

@@ -123,6 +123,67 @@ TEST_P(HotReload, ComputeFollowsToo) {
     EXPECT_EQ(value(), 8u) << "the bind group made for the old pipeline fits the new one";
 }
 
+TEST_P(HotReload, WhatTheProgramBindsAndPushesMustGoOnFitting) {
+    TemporaryFolder folder;
+    const auto write = [&](std::string_view declarations, std::string_view value) {
+        ok(write_file_atomically(folder.path() / "fill.comp",
+                                 "layout(local_size_x = 1) in;\n"
+                                 "layout(set = 0, binding = 0) buffer Words { uint word; };\n" +
+                                     std::string(declarations) + "void main() { word = " + std::string(value) +
+                                     "; }\n"));
+    };
+    // Set 0 has an explicit layout, set 1 that of the shader.
+    constexpr std::string_view one =
+        "layout(set = 1, binding = 0) uniform Number { uint number; };\n"
+        "layout(push_constant) uniform Pushed { uint pushed; };\n";
+    write(one, "number + pushed");
+    ShaderCompiler compiler({.source_folder = folder.path()});
+    PipelineReloader pipelines(device(), compiler);
+    const BindGroupLayout words_layout = ok(device().create_bind_group_layout(
+        {.bindings = {{0, BindingType::storage_buffer, 1, ShaderStage::compute}}, .name = "words"}));
+    const auto fill = ok(pipelines.add(ComputePipelineDesc{.bind_group_layouts = {words_layout}, .name = "fill"},
+                                       {.path = "fill.comp"}));
+    const Buffer words = buffer(4, BufferUsage::storage);
+    const Buffer numbers = buffer_of<std::uint32_t>(std::array<std::uint32_t, 4>{40, 50, 0, 0}, BufferUsage::uniform);
+    const BindGroup words_group =
+        ok(device().create_bind_group({.layout = words_layout, .entries = {{.binding = 0, .buffer = words}}}));
+    const BindGroup number_group =
+        ok(device().create_bind_group({.layout = ok(device().bind_group_layout(pipelines.get(fill), 1)),
+                                       .entries = {{.binding = 0, .buffer = numbers}}}));
+    const auto value = [&] {
+        CommandList list = device().create_command_list("fill");
+        list.set_pipeline(pipelines.get(fill));
+        list.set_bind_group(0, words_group);
+        list.set_bind_group(1, number_group);
+        list.set_push_constants(std::uint32_t{2});
+        list.dispatch({});
+        run(std::move(list));
+        return read<std::uint32_t>(words)[0];
+    };
+    EXPECT_EQ(value(), 42u);
+    const auto expect_refused = [&](const char* reason) {
+        const auto reloads = pipelines.reload_changed();
+        ASSERT_EQ(reloads.size(), 1u);
+        ASSERT_TRUE(reloads[0].error);
+        EXPECT_EQ(reloads[0].error->code, ErrorCode::unsupported);
+        EXPECT_THAT(reloads[0].error->message(), HasSubstr(reason));
+        EXPECT_EQ(value(), 42u) << "the old pipeline goes on working";
+    };
+    write(
+        "layout(set = 1, binding = 1) uniform Number { uint number; };\n"
+        "layout(push_constant) uniform Pushed { uint pushed; };\n",
+        "number + pushed");
+    expect_refused("set 1");
+    write(
+        "layout(set = 1, binding = 0) uniform Number { uint number; };\n"
+        "layout(push_constant) uniform Pushed { uvec4 pushed; };\n",
+        "number + pushed.x");
+    expect_refused("push constants");
+    write(one, "number - pushed");
+    EXPECT_EQ(pipelines.reload_changed().size(), 1u);
+    EXPECT_EQ(value(), 38u);
+}
+
 TEST_P(HotReload, WhatCannotBeMadeAtFirstIsAnError) {
     TemporaryFolder folder;
     ShaderCompiler compiler({.source_folder = folder.path()});

@@ -347,7 +347,13 @@ TEST_P(Faults, IntegerDivisionAndShiftsHaveNoTraps) {
 }
 
 TEST_P(Faults, StrangeTrianglesStayInsideTheTarget) {
-    const Texture picture = target(Format::r8_unorm, 8, 8);
+    // The target is the middle one of three layers: what is written beside it would be seen.
+    const Texture picture = ok(device().create_texture({.format = Format::r8_unorm,
+                                                        .width = 8,
+                                                        .height = 8,
+                                                        .layers = 3,
+                                                        .usage = TextureUsage::color_target | TextureUsage::copy_source,
+                                                        .name = "layers"}));
     GraphicsPipelineDesc desc;
     desc.vertex = shader(ShaderStage::vertex, R"(
         layout(push_constant) uniform P { vec4 a; vec4 b; vec4 c; };
@@ -357,23 +363,49 @@ TEST_P(Faults, StrangeTrianglesStayInsideTheTarget) {
         shader(ShaderStage::fragment, "layout(location = 0) out vec4 color; void main() { color = vec4(1); }");
     desc.color_targets = {{.format = Format::r8_unorm}};
     const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc));
-    const float nan = std::numeric_limits<float>::quiet_NaN(), infinite = std::numeric_limits<float>::infinity();
+    desc.cull = CullMode::back;
+    const GraphicsPipeline culling = ok(device().create_graphics_pipeline(desc));
     struct Corners {
         float values[12];
     };
-    CommandList list = device().create_command_list("strange");
-    list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear}}});
-    list.set_pipeline(pipeline);
+    const auto draw = [&](GraphicsPipeline with, const Corners& corners) {
+        CommandList list = device().create_command_list("strange");
+        for (std::uint32_t index : {0u, 1u, 2u}) {
+            list.begin_render_pass(
+                {.color = {{.view = TextureView::subresource(picture, 0, index), .load = LoadOperation::clear}}});
+            if (index == 1) {
+                list.set_pipeline(with);
+                list.set_push_constants(corners);
+                list.draw({.vertex_count = 3});
+            }
+            list.end_render_pass();
+        }
+        run(std::move(list));
+        for (const std::uint32_t index : {0u, 2u})
+            EXPECT_EQ(ok(device().read_texture(picture, 0, index)), std::vector<std::byte>(64)) << "layer " << index;
+        return ok(device().read_texture(picture, 0, 1));
+    };
+    const std::vector<std::byte> nothing(64), everything(64, std::byte{255});
+    // A whole one first: the rest is no proof otherwise.
+    const Corners whole{{-1, -1, 0, 1, 3, -1, 0, 1, -1, 3, 0, 1}}, inverted{{-1, -1, 0, 1, -1, 3, 0, 1, 3, -1, 0, 1}};
+    EXPECT_EQ(draw(pipeline, whole), everything);
+    EXPECT_EQ(draw(pipeline, inverted), everything);
+    EXPECT_NE(draw(culling, whole), draw(culling, inverted));
+    EXPECT_EQ(draw(pipeline, {{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}}), nothing) << "a point";
+    EXPECT_EQ(draw(pipeline, {{-1, -1, 0, 1, 0, 0, 0, 1, 1, 1, 0, 1}}), nothing) << "a line";
+    EXPECT_EQ(draw(pipeline, {{0.01f, 0.01f, 0, 1, 0.05f, 0.01f, 0, 1, 0.01f, 0.05f, 0, 1}}), nothing)
+        << "between the centers of pixels";
+    EXPECT_EQ(draw(pipeline, {{2, 0, 0, 1, 1e30f, 5, 0, 1, 1e30f, -1e30f, 0, 1}}), nothing) << "right of the picture";
+    EXPECT_EQ(draw(pipeline, {{0, 0, 0, -1, 1, 0, 0, -1, 0, 1, 0, -5}}), nothing) << "behind the viewer";
+    // What these cover is for the driver to say; that they end, and stay inside, is not.
+    const float nan = std::numeric_limits<float>::quiet_NaN(), infinite = std::numeric_limits<float>::infinity();
     for (const Corners& corners :
-         {Corners{{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}}, Corners{{1e30f, 0, 0, 1, -1e30f, 5, 0, 1, 0, -1e30f, 0, 1}},
-          Corners{{0, 0, 0, 0, 1, 0, 0, -1, 0, 1, 0, -5}}, Corners{{nan, 0, 0, 1, 1, nan, 0, 1, 0, 1, 0, nan}},
+         {Corners{{1e30f, 0, 0, 1, -1e30f, 5, 0, 1, 0, -1e30f, 0, 1}}, Corners{{0, 0, 0, 0, 1, 0, 0, -1, 0, 1, 0, 5}},
+          Corners{{nan, 0, 0, 1, 1, nan, 0, 1, 0, 1, 0, nan}},
           Corners{{infinite, 0, 0, 1, 1, -infinite, 0, 1, 0, 1, infinite, 1}}}) {
-        list.set_push_constants(corners);
-        list.draw({.vertex_count = 3});
+        draw(pipeline, corners);
     }
-    list.end_render_pass();
-    run(std::move(list));
-    EXPECT_EQ(read<std::uint8_t>(picture).size(), 64u);
+    EXPECT_EQ(draw(pipeline, whole), everything);
 }
 
 TEST_P(Faults, EmptyWorkIsNoError) {

@@ -371,6 +371,9 @@ void Emitter::emit_edge(std::uint32_t from, Id to, llvm::Value* condition) {
             break;
         }
     }
+    // Lanes that leave a loop one by one add to those that left it in earlier iterations.
+    const std::uint32_t loop = frame->blocks[from].divergent_loop;
+    const bool leaves = loop != ~0u && (*target_index < loop || *target_index >= end_of_construct(function, loop));
     // The only way into a block, and the ways into a loop, bring values for all lanes that come; others add to what lanes
     // before them brought.
     bool is_plain = is_back || block.predecessors.size() == 1;
@@ -379,6 +382,7 @@ void Emitter::emit_edge(std::uint32_t from, Id to, llvm::Value* condition) {
         for (const std::uint32_t predecessor : block.predecessors) entries += predecessor < *target_index;
         is_plain = entries == 1;
     }
+    is_plain = is_plain && !leaves;
     for (std::size_t i = 0; i < block.phis.size(); ++i)
         for (std::size_t k = 0; k < incoming[i].size(); ++k) {
             llvm::AllocaInst* slot = state.phi_slots[i][k];
@@ -403,7 +407,7 @@ void Emitter::emit_edge(std::uint32_t from, Id to, llvm::Value* condition) {
     llvm::Value* taken = !condition                          ? runs_without_lanes ? any(mask) : builder.getTrue()
                          : condition->getType()->isVectorTy() ? any(edge_mask)
                                                              : condition;
-    if (block.predecessors.size() == 1) {
+    if (block.predecessors.size() == 1 && !leaves) {
         // One way in: the mask counts only if the block is reached, so a scalar condition need not clear it.
         builder.CreateStore(taken, reached);
         builder.CreateStore(condition && !condition->getType()->isVectorTy() ? mask : edge_mask, gathered);

@@ -67,67 +67,79 @@ Id Uniformity::root_of(Id pointer) const {
 }
 
 /// Marks what a divergent branch at the end of `block` does to the blocks that its lanes reach before they meet again.
+///
+/// Follows the lanes in the order in which blocks run. Each way that lanes took has a label; where two labels come together
+/// lanes join, with different values. As long as lanes wait anywhere else, be it at a later block, for the next iteration of
+/// a loop or, in a function that is called, for its end, the block that runs is partial.
 void Uniformity::spread(const Function& function, std::uint32_t block) {
-    const Block& from = function.blocks[block];
-    // Lanes have met again at the merge block of the selection; without one (a conditional break or continue) at the
-    // latest at the merge block or continue target of the innermost loop or switch around it.
-    const auto own_merge = from.continue_target ? std::nullopt : function.find_block(from.merge);
-    const std::uint32_t count = static_cast<std::uint32_t>(function.blocks.size());
-    std::vector<std::uint32_t> stops;
-    if (own_merge) {
-        stops.push_back(*own_merge);
-    }
-    // All loops around the block, the block itself included; their continue targets and merge blocks are where lanes wait.
-    std::vector<std::uint32_t> loops;
-    for (std::uint32_t header = 0; header <= block; ++header) {
-        if (!function.blocks[header].continue_target) continue;
-        if (end_of_construct(function, header) <= block) continue;
-        loops.push_back(header);
-        if (const auto target = function.find_block(function.blocks[header].continue_target)) stops.push_back(*target);
-        stops.push_back(end_of_construct(function, header));
-    }
-    std::vector<char> reached_by(count, 0);  // Number of successors from which the block is reached, up to 2.
-    std::vector<char> seen(count);
-    std::vector<std::uint32_t> work;
+    constexpr std::uint32_t none = ~0u;
+    const auto count = static_cast<std::uint32_t>(function.blocks.size());
+    const bool is_called = function.id != module_.entry().id;
+    std::vector<std::uint32_t> labels(count, none);
+    std::uint32_t waiting = 0;  // Blocks with a label.
     bool leaves = false;
-    for (const Id successor : from.successors) {
-        const auto start = function.find_block(successor);
-        if (!start) continue;
-        std::ranges::fill(seen, 0);
-        work.assign(1, *start);
-        while (!work.empty()) {
-            const std::uint32_t at = work.back();
-            work.pop_back();
-            if (at <= block || seen[at]) continue;  // Over a back edge: the next iteration.
-            seen[at] = 1;
-            if (reached_by[at] < 2) ++reached_by[at];
-            if (std::ranges::find(stops, at) != stops.end()) continue;
-            if (function.blocks[at].successors.empty()) leaves = true;
-            for (const Id next : function.blocks[at].successors)
-                if (const auto index = function.find_block(next)) work.push_back(*index);
+    struct Loop {
+        std::uint32_t header, end;
+        bool goes_on = false;
+    };
+    std::vector<Loop> loops;  // Around the block, the innermost last.
+    for (std::uint32_t header = 0; header <= block; ++header)
+        if (function.blocks[header].continue_target && end_of_construct(function, header) > block)
+            loops.push_back({header, end_of_construct(function, header)});
+
+    const auto reach = [&](std::uint32_t from, Id id, std::uint32_t label) {
+        const auto to = function.find_block(id);
+        if (!to) return;
+        if (*to <= from) {
+            for (Loop& loop : loops) loop.goes_on = loop.goes_on || loop.header == *to;
+        } else if (labels[*to] == none) {
+            labels[*to] = label, ++waiting;
+        } else if (labels[*to] != label) {
+            labels[*to] = *to;
+            mark(divergent_join_, id);
         }
-    }
-    for (std::uint32_t at = block + 1; at < count; ++at) {
-        if (reached_by[at] > 1) mark(divergent_join_, function.blocks[at].id);
-        if (reached_by[at] && !(own_merge && at == *own_merge)) mark(partial_, function.blocks[at].id);
-    }
-    for (const std::uint32_t header : loops) {
-        const std::uint32_t end = end_of_construct(function, header);
-        bool exits = leaves || (header == block && from.successors.size() > 1);
-        for (std::uint32_t at = end; at < count; ++at) exits = exits || reached_by[at];
-        if (!exits) {
-            // Lanes that skip to the continue target join there with those that come later; the loop goes on with all.
-            continue;
+    };
+    for (const Id successor : function.blocks[block].successors)
+        if (const auto to = function.find_block(successor)) reach(block, successor, count + *to);
+    for (std::uint32_t at = block + 1; at <= count; ++at) {
+        while (!loops.empty() && loops.back().end <= at) {
+            const Loop loop = loops.back();
+            loops.pop_back();
+            if (!loop.goes_on) continue;
+            // All lanes that are left go round again together.
+            if (waiting == 0 && !leaves) return;
+            mark(divergent_exit_, function.blocks[loop.header].id);
+            for (std::uint32_t i = loop.header; i < loop.end; ++i) {
+                mark(partial_, function.blocks[i].id);
+                // Lanes that leave in different iterations bring different values, wherever they go.
+                for (const Id successor : function.blocks[i].successors) {
+                    const auto to = function.find_block(successor);
+                    if (!to || (*to >= loop.header && *to < loop.end)) continue;
+                    mark(divergent_join_, successor);
+                    if (*to <= i) {
+                        reach(i, successor, none);
+                        continue;
+                    }
+                    if (labels[*to] == none) ++waiting;
+                    labels[*to] = *to;
+                }
+                leaves = leaves || (function.blocks[i].successors.empty() && !function.blocks[i].predecessors.empty());
+            }
         }
-        mark(divergent_exit_, function.blocks[header].id);
-        for (std::uint32_t at = header; at < end; ++at) mark(partial_, function.blocks[at].id);
-        // Lanes that leave in different iterations bring different values to the join.
-        if (end < count) mark(divergent_join_, function.blocks[end].id);
-        for (std::uint32_t at = end; at < count; ++at)
-            if (reached_by[at]) mark(divergent_join_, function.blocks[at].id);
+        if (at == count || labels[at] == none) continue;
+        bool alone = waiting == 1 && !(leaves && is_called);
+        for (const Loop& loop : loops) alone = alone && !loop.goes_on;
+        // Here all have met, but for those that have left a loop for good, whose exit is known by then.
+        if (alone && (loops.empty() || !leaves)) break;
+        if (!alone) mark(partial_, function.blocks[at].id);
+        --waiting;
+        const std::uint32_t label = labels[at];
+        labels[at] = none;
+        if (function.blocks[at].successors.empty()) leaves = true;
+        for (const Id successor : function.blocks[at].successors) reach(at, successor, label);
     }
     // A callee's lanes come back to the caller wherever they return.
-    if (leaves && function.id != module_.entry().id) mark(divergent_return_, function.id);
+    if (leaves && is_called) mark(divergent_return_, function.id);
 }
 
 void Uniformity::visit(const Instruction& at, Id block) {
@@ -280,11 +292,14 @@ void Uniformity::analyze(const Function& function) {
         }
         std::ranges::sort(inside);
         const auto is_inside = [&](Id id) { return std::ranges::binary_search(inside, id); };
-        for (std::uint32_t i = end; i < function.blocks.size(); ++i) {
+        for (std::uint32_t i = 0; i < function.blocks.size(); ++i) {
+            if (i >= header && i < end) continue;
             const Block& block = function.blocks[i];
+            // Before the loop: at the header of a loop around it, for the next iteration.
             for (const Instruction& at : block.phis)
                 for (std::size_t k = 0; k < at.operands.size(); k += 2)
                     if (is_inside(at.operands[k])) mark(divergent_, at.result);
+            if (i < header) continue;
             for (const Instruction& at : block.body)
                 for (const std::uint32_t operand : at.operands)
                     if (at.result && is_inside(operand)) mark(divergent_, at.result);

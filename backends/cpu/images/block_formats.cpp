@@ -33,7 +33,8 @@ std::uint32_t mix_colors(std::uint32_t color0, std::uint32_t color1, std::uint32
 
 void decode_color_block(const std::byte* block, bool always_four_colors, std::uint32_t (&texels)[16]) {
     const std::uint64_t bits = read_bits(block);
-    const auto color0 = static_cast<std::uint32_t>(bits & 0xffff), color1 = static_cast<std::uint32_t>((bits >> 16) & 0xffff);
+    const auto color0 = static_cast<std::uint32_t>(bits & 0xffff),
+               color1 = static_cast<std::uint32_t>((bits >> 16) & 0xffff);
     std::uint32_t palette[4] = {mix_colors(color0, color1, 1, 0), mix_colors(color0, color1, 0, 1), 0, 0};
     if (always_four_colors || color0 > color1) {
         palette[2] = mix_colors(color0, color1, 2, 1);
@@ -73,8 +74,10 @@ void decode_channel_block(const std::byte* block, bool is_signed, float (&texels
 
 void decode_rgba8_block(Format format, const std::byte* block, std::uint32_t (&texels)[16]) {
     switch (format) {
-        case Format::bc1_rgba_unorm: case Format::bc1_rgba_srgb: decode_color_block(block, false, texels); break;
-        case Format::bc2_rgba_unorm: case Format::bc2_rgba_srgb: {
+        case Format::bc1_rgba_unorm:
+        case Format::bc1_rgba_srgb: decode_color_block(block, false, texels); break;
+        case Format::bc2_rgba_unorm:
+        case Format::bc2_rgba_srgb: {
             decode_color_block(block + 8, true, texels);
             const std::uint64_t alpha = read_bits(block);
             for (int i = 0; i < 16; ++i) {
@@ -82,7 +85,8 @@ void decode_rgba8_block(Format format, const std::byte* block, std::uint32_t (&t
             }
             break;
         }
-        case Format::bc3_rgba_unorm: case Format::bc3_rgba_srgb: {
+        case Format::bc3_rgba_unorm:
+        case Format::bc3_rgba_srgb: {
             decode_color_block(block + 8, true, texels);
             float alpha[16];
             decode_channel_block(block, false, alpha);
@@ -91,7 +95,8 @@ void decode_rgba8_block(Format format, const std::byte* block, std::uint32_t (&t
             }
             break;
         }
-        case Format::bc7_rgba_unorm: case Format::bc7_rgba_srgb: decode_bc7_block(block, texels); break;
+        case Format::bc7_rgba_unorm:
+        case Format::bc7_rgba_srgb: decode_bc7_block(block, texels); break;
         default: std::fill(std::begin(texels), std::end(texels), 0u); break;
     }
 }

@@ -21,8 +21,8 @@ void decode_channel_block(const std::byte* block, bool is_signed, float (&texels
 /// BC6H: 16-bit floats of red, green and blue. A block of a reserved mode is all zero.
 void decode_bc6h_block(const std::byte* block, bool is_signed, std::uint16_t (&texels)[16][3]);
 
-/// For two subsets, bit i is the subset of texel i (shared by BC6H and BC7); and the texel of the second subset whose index has
-/// one bit less.
+/// For two subsets, bit i is the subset of texel i (shared by BC6H and BC7); and the texel of the second subset whose
+/// index has one bit less.
 extern const std::uint16_t two_subset_partitions[64];
 extern const std::uint8_t two_subset_anchors[64];
 

@@ -41,8 +41,12 @@ FormatPlan make_plan(Format format) {
     plan.words = static_cast<std::uint8_t>((facts.block_bytes + 3) / 4);
     if (facts.is_compressed()) {
         switch (format) {
-            case Format::bc4_r_unorm: case Format::bc4_r_snorm: case Format::bc5_rg_unorm: case Format::bc5_rg_snorm:
-            case Format::bc6h_rgb_ufloat: case Format::bc6h_rgb_sfloat: plan.codec = Codec::block_channels; break;
+            case Format::bc4_r_unorm:
+            case Format::bc4_r_snorm:
+            case Format::bc5_rg_unorm:
+            case Format::bc5_rg_snorm:
+            case Format::bc6h_rgb_ufloat:
+            case Format::bc6h_rgb_sfloat: plan.codec = Codec::block_channels; break;
             default: plan.codec = facts.kind == FormatKind::srgb ? Codec::block_srgb8 : Codec::block_rgba8; break;
         }
         return plan;
@@ -59,19 +63,22 @@ FormatPlan make_plan(Format format) {
             plan.texel_bytes = 4, plan.words = 1;
             plan.is_fixed_point_depth = true;
             return plan;
-        case Format::d32_float: case Format::d32_float_s8_uint:
+        case Format::d32_float:
+        case Format::d32_float_s8_uint:
             plan.codec = Codec::word;
             plan.channels[0] = channel(0, 32, ChannelCoding::single);
             plan.channel_count = 1;
             plan.texel_bytes = 4, plan.words = 1;
             return plan;
-        case Format::rgb10a2_unorm: case Format::rgb10a2_uint:
+        case Format::rgb10a2_unorm:
+        case Format::rgb10a2_uint:
             for (std::uint32_t c = 0; c < 3; ++c) plan.channels[c] = channel(10 * c, 10, coding_of(facts.kind, 10));
             plan.channels[3] = channel(30, 2, coding_of(facts.kind, 2));
             plan.can_store = true;
             return plan;
         case Format::rg11b10_float:
-            for (std::uint32_t c = 0; c < 3; ++c) plan.channels[c] = channel(11 * c, c < 2 ? 11 : 10, ChannelCoding::small_float);
+            for (std::uint32_t c = 0; c < 3; ++c)
+                plan.channels[c] = channel(11 * c, c < 2 ? 11 : 10, ChannelCoding::small_float);
             plan.can_store = true;
             return plan;
         case Format::rgb9e5_float: plan.codec = Codec::shared_exponent; return plan;
@@ -103,9 +110,6 @@ const std::array<FormatPlan, rhi::format_count> plans = [] {
 
 }  // namespace
 
-const FormatPlan& format_plan(Format format) {
-    const auto index = static_cast<std::uint32_t>(format);
-    return plans[index < rhi::format_count ? index : 0];
-}
+const FormatPlan* const format_plans = plans.data();
 
 }  // namespace nacre::cpu

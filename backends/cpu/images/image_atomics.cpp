@@ -25,14 +25,17 @@ std::uint32_t updated(AtomicOperation operation, std::uint32_t old, std::uint32_
         case AtomicOperation::exchange: return value;
         case AtomicOperation::compare_exchange: return old == comparator ? value : old;
         case AtomicOperation::add_float: return std::bit_cast<std::uint32_t>(as_float(old) + as_float(value));
-        case AtomicOperation::minimum_float: return std::bit_cast<std::uint32_t>(std::fmin(as_float(old), as_float(value)));
-        case AtomicOperation::maximum_float: return std::bit_cast<std::uint32_t>(std::fmax(as_float(old), as_float(value)));
+        case AtomicOperation::minimum_float:
+            return std::bit_cast<std::uint32_t>(std::fmin(as_float(old), as_float(value)));
+        case AtomicOperation::maximum_float:
+            return std::bit_cast<std::uint32_t>(std::fmax(as_float(old), as_float(value)));
     }
     return old;
 }
 
 bool fits(AtomicOperation operation, rhi::Format format) {
-    const bool is_float_operation = operation == AtomicOperation::add_float || operation == AtomicOperation::minimum_float ||
+    const bool is_float_operation = operation == AtomicOperation::add_float ||
+                                    operation == AtomicOperation::minimum_float ||
                                     operation == AtomicOperation::maximum_float;
     if (format == rhi::Format::r32_float) return is_float_operation || operation == AtomicOperation::exchange;
     return (format == rhi::Format::r32_uint || format == rhi::Format::r32_sint) && !is_float_operation;
@@ -48,12 +51,15 @@ std::byte* texel_address(const ImageView& image, const ImageArguments& arguments
     switch (image.dimension) {
         case d1: break;
         case d1_array: layer = coordinate(1); break;
-        case d2_array: case cube: case cube_array: y = coordinate(1), layer = coordinate(2); break;
+        case d2_array:
+        case cube:
+        case cube_array: y = coordinate(1), layer = coordinate(2); break;
         case d3: y = coordinate(1), z = coordinate(2); break;
         default: y = coordinate(1); break;
     }
     const std::uint32_t sample = image.samples > 1 ? static_cast<std::uint32_t>(arguments.sample[lane]) : 0;
-    if (x >= level.width || y >= level.height || z >= level.depth || layer >= image.layer_count || sample >= image.samples) {
+    if (x >= level.width || y >= level.height || z >= level.depth || layer >= image.layer_count ||
+        sample >= image.samples) {
         return nullptr;
     }
     return level.data + layer * level.layer_stride + sample * level.sample_stride + z * level.slice_stride +
@@ -62,7 +68,8 @@ std::byte* texel_address(const ImageView& image, const ImageArguments& arguments
 
 }  // namespace
 
-void image_atomic(const ImageView* image, ImageArguments* arguments, std::uint32_t, std::uint32_t live, std::uint32_t lanes) {
+void image_atomic(const ImageView* image, ImageArguments* arguments, std::uint32_t, std::uint32_t live,
+                  std::uint32_t lanes) {
     const bool can_run = image != nullptr && image->mip_count > 0 && image->levels[0].data != nullptr &&
                          fits(arguments->atomic, image->format);
     for (std::uint32_t lane = 0; lane < lanes; ++lane) {

@@ -6,8 +6,8 @@
 #include "backends/cpu/shader_interface.h"
 
 /// @file
-/// The same image operations for several instruction sets. `lanes` is 4, 8 or 16; what is returned must not run on a machine
-/// without the instruction set.
+/// The same image operations for several instruction sets. `lanes` is 4, 8 or 16; what is returned must not run on a
+/// machine without the instruction set.
 
 namespace nacre::cpu {
 

@@ -7,13 +7,14 @@
 #include "backends/cpu/shader_interface.h"
 
 /// @file
-/// Everything that shaders do with textures and images. One function serves all operations (see ImageOperation and ImageFlags in
-/// shader_interface.h); filtering follows the equations of the Vulkan specification in 32-bit floats, and all instruction sets and
-/// lane counts give the same bits.
+/// Everything that shaders do with textures and images. One function serves all operations (see ImageOperation and
+/// ImageFlags in shader_interface.h); filtering follows the equations of the Vulkan specification in 32-bit floats, and
+/// all instruction sets and lane counts give the same bits.
 ///
-/// Levels of `ImageOperation::fetch` are 32-bit integers whose bits lie in `ImageArguments::lod`. Reads outside of an image give
-/// zeros in all channels, writes there vanish, and no coordinate (NaN, infinity, any integer) does harm. Anisotropic filtering
-/// applies to 2D images and arrays of them, with up to 16 samples along the footprint's longer axis.
+/// Levels of `ImageOperation::fetch` are 32-bit integers whose bits lie in `ImageArguments::lod`. Reads outside of an
+/// image give zeros in all channels, writes there vanish, and no coordinate (NaN, infinity, any integer) does harm.
+/// Anisotropic filtering applies to 2D images and arrays of them, with up to 16 samples along the footprint's longer
+/// axis.
 ///
 ///     NacreCpuImageFunction run = image_function(8);
 ///     run(&view, &sampler, &arguments, flags_of(ImageOperation::sample) | image_lod_implicit, 0xff);

@@ -64,14 +64,16 @@ float decode_small_float(std::uint32_t bits, std::uint32_t mantissa_bits) {
 std::uint32_t encode_small_float(float value, std::uint32_t mantissa_bits) {
     const std::uint32_t infinity = 31u << mantissa_bits;
     if (std::isnan(value)) {
-        const std::uint32_t payload = std::bit_cast<std::uint32_t>(value) >> (23 - mantissa_bits) & ((1u << mantissa_bits) - 1);
+        const std::uint32_t payload =
+            std::bit_cast<std::uint32_t>(value) >> (23 - mantissa_bits) & ((1u << mantissa_bits) - 1);
         return infinity | (1u << (mantissa_bits - 1)) | payload;
     }
     if (!(value > 0.0f)) return 0;
     if (std::isinf(value)) return infinity;
     // Below 2^-14 values are multiples of the smallest one.
     if (value < 0x1p-14f) {
-        return static_cast<std::uint32_t>(round_even(std::ldexp(static_cast<double>(value), 14 + static_cast<int>(mantissa_bits))));
+        return static_cast<std::uint32_t>(
+            round_even(std::ldexp(static_cast<double>(value), 14 + static_cast<int>(mantissa_bits))));
     }
     const std::uint32_t bits = std::bit_cast<std::uint32_t>(value), dropped = 23 - mantissa_bits;
     const std::uint32_t rounded = (bits + (1u << (dropped - 1)) - 1 + ((bits >> dropped) & 1)) >> dropped;
@@ -98,13 +100,11 @@ std::uint32_t encode_shared_exponent(const float* rgb) {
         return static_cast<std::uint32_t>(std::floor(std::ldexp(static_cast<double>(value), 24 - e) + 0.5));
     };
     if (scaled(largest, exponent) == 512) ++exponent;
-    return scaled(channels[0], exponent) | (scaled(channels[1], exponent) << 9) | (scaled(channels[2], exponent) << 18) |
-           (static_cast<std::uint32_t>(exponent) << 27);
+    return scaled(channels[0], exponent) | (scaled(channels[1], exponent) << 9) |
+           (scaled(channels[2], exponent) << 18) | (static_cast<std::uint32_t>(exponent) << 27);
 }
 
-double srgb_to_linear(double code) {
-    return code <= 0.04045 ? code / 12.92 : std::pow((code + 0.055) / 1.055, 2.4);
-}
+double srgb_to_linear(double code) { return code <= 0.04045 ? code / 12.92 : std::pow((code + 0.055) / 1.055, 2.4); }
 
 struct SrgbTables {
     std::array<float, 256> linear{};
@@ -135,8 +135,10 @@ Shape shape(Format format) {
     if (facts.channels == 0) return {Layout::none};
     if (facts.is_compressed() || facts.is_depth_stencil()) return {Layout::packed};
     switch (format) {
-        case Format::rgb10a2_unorm: case Format::rgb10a2_uint: case Format::rg11b10_float: case Format::rgb9e5_float:
-            return {Layout::packed};
+        case Format::rgb10a2_unorm:
+        case Format::rgb10a2_uint:
+        case Format::rg11b10_float:
+        case Format::rgb9e5_float: return {Layout::packed};
         case Format::bgra8_unorm: return {Layout::bytes_bgra, 4, Coding::unorm};
         case Format::bgra8_srgb: return {Layout::bytes_bgra, 4, Coding::srgb};
         default: break;
@@ -207,8 +209,12 @@ Texel decode_packed(Format format, const std::byte* block, std::uint32_t element
         case Format::d24_unorm_s8_uint:
             texel.f[0] = decode_unorm(read<std::uint32_t>(block) & 0xffffff, 0xffffff);
             return texel;
-        case Format::d32_float: case Format::d32_float_s8_uint: texel.f[0] = read<float>(block); return texel;
-        case Format::bc4_r_unorm: case Format::bc4_r_snorm: case Format::bc5_rg_unorm: case Format::bc5_rg_snorm: {
+        case Format::d32_float:
+        case Format::d32_float_s8_uint: texel.f[0] = read<float>(block); return texel;
+        case Format::bc4_r_unorm:
+        case Format::bc4_r_snorm:
+        case Format::bc5_rg_unorm:
+        case Format::bc5_rg_snorm: {
             const bool is_signed = format == Format::bc4_r_snorm || format == Format::bc5_rg_snorm;
             for (int c = 0; c < rhi::info(format).channels; ++c) {
                 float values[16];
@@ -217,7 +223,8 @@ Texel decode_packed(Format format, const std::byte* block, std::uint32_t element
             }
             return texel;
         }
-        case Format::bc6h_rgb_ufloat: case Format::bc6h_rgb_sfloat: {
+        case Format::bc6h_rgb_ufloat:
+        case Format::bc6h_rgb_sfloat: {
             std::uint16_t values[16][3];
             decode_bc6h_block(block, format == Format::bc6h_rgb_sfloat, values);
             for (int c = 0; c < 3; ++c) texel.f[c] = half_to_float(values[element][c]);
@@ -242,7 +249,8 @@ void encode_packed(Format format, const Texel& texel, std::byte* out) {
                            (encode_unorm(texel.f[2], 1023) << 20) | (encode_unorm(texel.f[3], 3) << 30));
             break;
         case Format::rgb10a2_uint:
-            write(out, (texel.u[0] & 1023) | ((texel.u[1] & 1023) << 10) | ((texel.u[2] & 1023) << 20) | (texel.u[3] << 30));
+            write(out,
+                  (texel.u[0] & 1023) | ((texel.u[1] & 1023) << 10) | ((texel.u[2] & 1023) << 20) | (texel.u[3] << 30));
             break;
         case Format::rg11b10_float:
             write(out, encode_small_float(texel.f[0], 6) | (encode_small_float(texel.f[1], 6) << 11) |
@@ -251,7 +259,8 @@ void encode_packed(Format format, const Texel& texel, std::byte* out) {
         case Format::rgb9e5_float: write(out, encode_shared_exponent(texel.f)); break;
         case Format::d16_unorm: write(out, static_cast<std::uint16_t>(encode_unorm(texel.f[0], 65535))); break;
         case Format::d24_unorm_s8_uint: write(out, encode_unorm(texel.f[0], 0xffffff)); break;
-        case Format::d32_float: case Format::d32_float_s8_uint: write(out, texel.f[0]); break;
+        case Format::d32_float:
+        case Format::d32_float_s8_uint: write(out, texel.f[0]); break;
         default: break;
     }
 }
@@ -286,7 +295,8 @@ const float* srgb_to_linear_table() { return srgb_tables().linear.data(); }
 std::uint8_t linear_to_srgb(float linear) {
     if (!(linear > 0.0f)) return 0;
     const auto& thresholds = srgb_tables().thresholds;
-    return static_cast<std::uint8_t>(std::upper_bound(thresholds.begin(), thresholds.end(), linear) - thresholds.begin());
+    return static_cast<std::uint8_t>(std::upper_bound(thresholds.begin(), thresholds.end(), linear) -
+                                     thresholds.begin());
 }
 
 Texel decode_texel(Format format, const std::byte* block, std::uint32_t x_in_block, std::uint32_t y_in_block) {
@@ -298,7 +308,9 @@ Texel decode_texel(Format format, const std::byte* block, std::uint32_t x_in_blo
     for (std::uint32_t c = 0; c < form.channels; ++c) {
         switch (form.layout) {
             case Layout::bytes: decode_byte(texel, c, read<std::uint8_t>(block + c), form.coding); break;
-            case Layout::bytes_bgra: decode_byte(texel, c, read<std::uint8_t>(block + (c < 3 ? 2 - c : 3)), form.coding); break;
+            case Layout::bytes_bgra:
+                decode_byte(texel, c, read<std::uint8_t>(block + (c < 3 ? 2 - c : 3)), form.coding);
+                break;
             case Layout::words: decode_word(texel, c, read<std::uint16_t>(block + 2 * c), form.coding); break;
             default: texel.u[c] = read<std::uint32_t>(block + 4 * c); break;
         }

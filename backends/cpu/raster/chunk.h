@@ -19,13 +19,15 @@ namespace nacre::cpu::raster {
 class AlignedMemory {
   public:
     /// Room for `bytes`; the first `kept` bytes stay.
-    void reserve(std::size_t bytes, std::size_t kept) {
-        if (bytes <= capacity_) return;
+    /// @return whether the memory is a new one
+    bool reserve(std::size_t bytes, std::size_t kept) {
+        if (bytes <= capacity_) return false;
         const std::size_t capacity = std::max(bytes, capacity_ + capacity_ / 2);
         std::unique_ptr<std::byte, Free> grown(static_cast<std::byte*>(::operator new(capacity, std::align_val_t{64})));
         if (kept) std::memcpy(grown.get(), memory_.get(), kept);
         memory_ = std::move(grown);
         capacity_ = capacity;
+        return true;
     }
     [[nodiscard]] std::byte* data() const { return memory_.get(); }
 

@@ -56,6 +56,9 @@ void plan_colors(const RasterPipeline& pipeline, const TargetSet& targets, DrawP
             for (std::uint32_t bit = bits.first; bit < bits.first + bits.count; ++bit)
                 color.word_masks[bit / 32] |= 1u << (bit % 32);
         }
+        color.as_it_is = !color.blends && !color.partial && rhi::info(format).block_bytes == 4 * rhi::info(format).channels &&
+                         rhi::info(format).kind != rhi::FormatKind::unorm && rhi::info(format).kind != rhi::FormatKind::snorm &&
+                         color.components >= rhi::info(format).channels;
         if (any) plan.colors[plan.color_count++] = color;
     }
 }
@@ -86,6 +89,9 @@ void plan_tests(const DrawState& state, const TargetSet& targets, bool hierarchi
         plan.discards || plan.writes_sample_mask || plan.writes_depth || plan.alpha_to_coverage;
     plan.shades = fragment.run && (plan.color_count != 0 || fragment.has_side_effects || changes_coverage);
     plan.late_tests = plan.shades && !fragment.early_tests && (changes_coverage || fragment.has_side_effects);
+    plan.plain_results = !plan.late_tests && !changes_coverage && targets.samples == 1;
+    for (std::uint32_t i = 0; i < plan.color_count; ++i)
+        plan.plain_results = plan.plain_results && !plan.colors[i].blends && !plan.colors[i].partial;
     // A fragment that fails against what is there now also fails against what the draw itself puts in front of it.
     plan.early_rejection = plan.late_tests && !fragment.has_side_effects && !plan.writes_depth && from.depth_test &&
                            !from.stencil_test && keeps_order(from.depth_compare);

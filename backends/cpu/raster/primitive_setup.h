@@ -126,19 +126,19 @@ inline void set_up_primitive(const DrawPlan& draw, const Record& record, const s
                            static_cast<float>(dw1 * weights.first_x + dw2 * weights.second_x),
                            static_cast<float>(dw1 * weights.first_y + dw2 * weights.second_y), 0.0f};
 
-    const Float4 first_x = Float4{} + static_cast<float>(weights.first_x);
-    const Float4 second_x = Float4{} + static_cast<float>(weights.second_x);
-    const Float4 first_y = Float4{} + static_cast<float>(weights.first_y);
-    const Float4 second_y = Float4{} + static_cast<float>(weights.second_y);
-    const Float4 one = Float4{} + 1.0f;
+    const Float4 first_x = static_cast<float>(weights.first_x) - Float4{};
+    const Float4 second_x = static_cast<float>(weights.second_x) - Float4{};
+    const Float4 first_y = static_cast<float>(weights.first_y) - Float4{};
+    const Float4 second_y = static_cast<float>(weights.second_y) - Float4{};
+    const Float4 one = 1.0f - Float4{};
     Plane* planes = primitive.varyings();
     for (std::uint32_t input = 0; input < draw.input_count; input += 4, planes += 4) {
         Int4 linear, flat;
         std::memcpy(&linear, draw.linear_masks + input, sizeof(linear));
         std::memcpy(&flat, draw.flat_masks + input, sizeof(flat));
-        const Float4 value0 = load4(vertices[0]->inputs() + input) * select4(linear, one, Float4{} + vertices[0]->inverse_w);
-        const Float4 value1 = load4(vertices[1]->inputs() + input) * select4(linear, one, Float4{} + vertices[1]->inverse_w);
-        const Float4 value2 = load4(vertices[2]->inputs() + input) * select4(linear, one, Float4{} + vertices[2]->inverse_w);
+        const Float4 value0 = load4(vertices[0]->inputs() + input) * select4(linear, one, vertices[0]->inverse_w - Float4{});
+        const Float4 value1 = load4(vertices[1]->inputs() + input) * select4(linear, one, vertices[1]->inverse_w - Float4{});
+        const Float4 value2 = load4(vertices[2]->inputs() + input) * select4(linear, one, vertices[2]->inverse_w - Float4{});
         const Float4 difference1 = value1 - value0, difference2 = value2 - value0;
         store_planes(planes, value0, difference1 * first_x + difference2 * second_x,
                      difference1 * first_y + difference2 * second_y, flat, load4(provoking->inputs() + input));

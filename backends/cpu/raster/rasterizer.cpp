@@ -25,7 +25,7 @@ namespace {
 /// shared and bins pay.
 constexpr std::uint32_t chunk_primitives = 512;
 /// A slab goes through both halves together, which bounds memory; its vertices and records fit the last cache level.
-constexpr std::uint32_t slab_primitives = 128 * 1024;
+constexpr std::uint32_t slab_primitives = 32 * 1024;
 constexpr std::uint32_t slab_draws = 16 * 1024;
 static_assert(slab_draws <= most_draws);
 /// Vertex functions with side effects run once for each index as long as an instance is not larger than this.

@@ -52,7 +52,7 @@ struct Lanes {
 
 NACRE_LANES_INLINE Floats floats(float value) {
     Floats result;
-    NACRE_EACH result.part[i] = FloatRegister{} + value;
+    NACRE_EACH result.part[i] = value - FloatRegister{};  // Adding zero would not keep a negative zero, and takes an addition.
     return result;
 }
 NACRE_LANES_INLINE Ints ints(std::int32_t value) {

@@ -106,8 +106,57 @@ struct Coverage {
         return mask_of(not_negative(inside));
     }
 
+    /// The frequent case: one sample, depth tested before the fragment function or not at all, no stencil.
+    template <int edge_count>
+    void run_simple_blocks(std::int32_t first_x, std::int32_t last_x, std::int32_t first_y, std::int32_t last_y) {
+        const Record& record = *run.record;
+        const DrawPlan& draw = *run.draw;
+        const rhi::CompareOperation operation = draw.depth_stencil.compare;
+        const bool shades = draw.shades, tests = run.depth != nullptr, writes = draw.depth_stencil.depth_write;
+        const Floats plane_c = floats(record.depth_c), plane_dx = floats(record.depth_dx), from_x = floats(record.x0);
+        const Floats center_x = to_floats(load(lane_x)) + floats(static_cast<float>(run.tile_x) + 0.5f);
+        const Floats center_y = to_floats(load(lane_y)) + floats(static_cast<float>(run.tile_y) + 0.5f);
+        std::uint32_t passed = 0;
+        for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y) {
+            // As in TileRun::depth_at; what is the same in a row of blocks is computed once.
+            const Floats along_y = floats(record.depth_dy) *
+                                   (center_y + floats(static_cast<float>(4 * block_y)) - floats(record.y0));
+            for (std::int32_t block_x = first_x; block_x <= last_x; ++block_x) {
+                std::uint32_t mask = bounded ? lanes_inside(block_x, block_y, x0, x1, y0, y1) : 0xffff;
+                if constexpr (edge_count > 0) mask &= covered<edge_count>(block_x, block_y, 0);
+                if (mask == 0) continue;
+                const std::uint32_t place = block_place(block_x, block_y);
+                if (tests) {
+                    const Floats x = center_x + floats(static_cast<float>(4 * block_x));
+                    const Ints key = depth_key(run.targets.depth_layout, plane_c + plane_dx * (x - from_x) + along_y,
+                                               run.depth_low, run.depth_high);
+                    std::int32_t* const depth = run.memory.depth[0] + place;
+                    const Ints old = load(depth);
+                    mask &= mask_of(operation == rhi::CompareOperation::less            ? less(key, old)
+                                    : operation == rhi::CompareOperation::less_or_equal ? ~less(old, key)
+                                                                                        : compare(operation, key, old));
+                    if (mask == 0) continue;
+                    if (writes) {
+                        store(depth, select(lanes_of(mask), key, old));
+                        run.depth_written(place);
+                    }
+                }
+                passed += static_cast<std::uint32_t>(__builtin_popcount(mask));
+                if (shades)
+                    run.append_block(0, run.tile_x + 4 * block_x, run.tile_y + 4 * block_y, place, mask, nullptr, nullptr);
+            }
+        }
+        run.memory.passed_samples += passed;
+    }
+
     template <int edge_count>
     void run_blocks(std::int32_t first_x, std::int32_t last_x, std::int32_t first_y, std::int32_t last_y) {
+        if constexpr (!multisampled) {
+            if (run.simple_depth) {
+                run_simple_blocks<edge_count>(first_x, last_x, first_y, last_y);
+                return;
+            }
+        }
         for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y)
             for (std::int32_t block_x = first_x; block_x <= last_x; ++block_x) {
                 const std::uint32_t limit = bounded ? lanes_inside(block_x, block_y, x0, x1, y0, y1) : 0xffff;
@@ -131,7 +180,53 @@ struct Coverage {
         }
     }
 
+    /// Small triangles with one sample: 32 bits are enough for their edges, and nothing is asked about them that a few blocks would
+    /// not answer as fast.
+    /// @return whether it was one
+    [[gnu::always_inline]] bool draw_small() {
+        const Record& record = *run.record;
+        Int4 x, y;
+        std::memcpy(&x, record.x, sizeof(x)), std::memcpy(&y, record.y, sizeof(y));
+        // The fourth lanes hold something else.
+        x = __builtin_shufflevector(x, x, 0, 1, 2, 0) - (run.tile_x * subpixels + subpixels / 2);
+        y = __builtin_shufflevector(y, y, 0, 1, 2, 0) - (run.tile_y * subpixels + subpixels / 2);
+        const auto lesser = [](Int4 one, Int4 other) { return one < other ? one : other; };
+        const auto greater = [](Int4 one, Int4 other) { return one > other ? one : other; };
+        const auto turned = [](Int4 all) { return __builtin_shufflevector(all, all, 1, 2, 0, 1); };
+        const Int4 next_x = turned(x), next_y = turned(y);
+        const std::int32_t low_x = lesser(lesser(x, next_x), turned(next_x))[0], high_x = greater(greater(x, next_x), turned(next_x))[0];
+        const std::int32_t low_y = lesser(lesser(y, next_y), turned(next_y))[0], high_y = greater(greater(y, next_y), turned(next_y))[0];
+        if (high_x - low_x > 32 * subpixels || high_y - low_y > 32 * subpixels) return false;
+        const DrawPlan& draw = *run.draw;
+        const auto cut = [&](std::int32_t low, std::int32_t high, std::int32_t begin, std::int32_t end, std::int32_t size,
+                             std::int32_t& first, std::int32_t& last) {
+            begin = begin > 0 ? begin : 0, end = end < size ? end : size;
+            first = (low + subpixels - 1) >> subpixel_bits, last = high >> subpixel_bits;
+            bounded |= (first < begin) | (last >= end);
+            first = first < begin ? begin : first, last = last < end ? last : end - 1;
+        };
+        cut(low_x, high_x, draw.x_begin - run.tile_x, draw.x_end - run.tile_x, run.width, x0, x1);
+        cut(low_y, high_y, draw.y_begin - run.tile_y, draw.y_end - run.tile_y, run.height, y0, y1);
+        if (x0 > x1 || y0 > y1) return true;
+        const std::int32_t region_x = x0 / 16, region_y = y0 / 16;
+        if (draw.hierarchical && run.depth && region_x == x1 / 16 && region_y == y1 / 16 &&
+            run.hidden(region_x, region_y, x0, x1, y0, y1))
+            return true;
+
+        const Int4 edge_a = y - next_y, edge_b = next_x - x;
+        const Int4 owns_border = (edge_a > 0) | ((edge_a == 0) & (edge_b > 0));
+        const Int4 value = (-1 - owns_border - edge_a * x - edge_b * y) >> subpixel_bits;
+        for (int i = 0; i < 3; ++i) {
+            a[i] = edge_a[i], b[i] = edge_b[i], e[i][0] = value[i];
+            steps[i] = ints(a[i]) * load(lane_x) + ints(b[i]) * load(lane_y);
+        }
+        run_blocks<3>(x0 / 4, x1 / 4, y0 / 4, y1 / 4);
+        return true;
+    }
+
     void draw_triangle() {
+        if constexpr (!multisampled)
+            if (draw_small()) return;
         if (!set_up()) return;
         const std::int32_t first_x = x0 / 4, last_x = x1 / 4, first_y = y0 / 4, last_y = y1 / 4;
         const bool rejects = run.draw->hierarchical && run.depth;
@@ -187,7 +282,7 @@ struct Coverage {
                 if (tests) {
                     alive[s] = test_lanes(draw.depth_stencil, run.front, key, masks[s], depth,
                                           run.stencil ? run.memory.stencil[s] + place : nullptr);
-                    if (alive[s] && draw.depth_stencil.depth_write && run.depth) run.depth_written(block_x, block_y);
+                    if (alive[s] && draw.depth_stencil.depth_write && run.depth) run.depth_written(place);
                 } else {
                     alive[s] &= mask_of(compare(draw.depth_stencil.compare, key, load(depth)));
                 }
@@ -196,25 +291,20 @@ struct Coverage {
             any |= alive[s];
         }
         if (any == 0 || !draw.shades) return;
-        for (std::uint32_t quad = 0; quad < 4; ++quad) {
-            const std::int32_t quad_x = x + 2 * static_cast<std::int32_t>(quad & 1);
-            const std::int32_t quad_y = y + 2 * static_cast<std::int32_t>(quad >> 1);
-            const std::uint32_t live = any >> (4 * quad) & 15;
-            if (live == 0) continue;
-            if constexpr (!multisampled) {
-                run.append(0, quad_x, quad_y, place + 4 * quad, live, nullptr, nullptr, quad);
-            } else {
-                std::uint32_t covered_samples[4] = {};
-                for (std::uint32_t i = 0; i < 4; ++i)
-                    for (std::uint32_t s = 0; s < samples; ++s)
-                        covered_samples[i] |= (masks[s] >> (4 * quad + i) & 1) << s;
-                if (!draw.runs_per_sample) {
-                    run.append(0, quad_x, quad_y, place + 4 * quad, live, covered_samples, alive, quad);
-                    continue;
+        if constexpr (!multisampled) {
+            run.append_block(0, x, y, place, any, nullptr, nullptr);
+        } else {
+            std::uint8_t covered_samples[16] = {}, alive_samples[16] = {};
+            for (std::uint32_t s = 0; s < samples; ++s)
+                for (std::uint32_t lane = 0; lane < 16; ++lane) {
+                    covered_samples[lane] = static_cast<std::uint8_t>(covered_samples[lane] | (masks[s] >> lane & 1) << s);
+                    alive_samples[lane] = static_cast<std::uint8_t>(alive_samples[lane] | (alive[s] >> lane & 1) << s);
                 }
+            if (!draw.runs_per_sample) {
+                run.append_block(0, x, y, place, any, covered_samples, alive_samples);
+            } else {
                 for (std::uint32_t s = 0; s < samples; ++s)
-                    if (const std::uint32_t own = alive[s] >> (4 * quad) & 15)
-                        run.append(s, quad_x, quad_y, place + 4 * quad, own, covered_samples, alive, quad);
+                    if (alive[s]) run.append_block(s, x, y, place, alive[s], nullptr, nullptr);
             }
         }
     }

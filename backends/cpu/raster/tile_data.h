@@ -128,6 +128,7 @@ struct ColorPlan {
     std::uint32_t output;      ///< Into FragmentBatch::colors.
     std::uint32_t components;
     bool blends, partial;      ///< `partial`: the write mask leaves channels of the format out.
+    bool as_it_is;             ///< Texels are the words of the output, without any conversion.
     rhi::BlendState blend;
     std::uint32_t word_masks[4];  ///< Bits of a texel that are written.
 };
@@ -142,6 +143,7 @@ struct DrawPlan {
     const std::int32_t* flat_masks;
     std::uint32_t primitive_bytes;       ///< PrimitiveData with its varyings.
     bool shades;                         ///< The fragment function runs at all.
+    bool plain_results;                  ///< Nothing but its colors comes out of it, and they overwrite what was there.
     bool late_tests;                     ///< Depth and stencil are tested after it.
     bool early_rejection;                ///< Depth is also tested before it, without writing.
     bool hierarchical;                   ///< Whole regions may be rejected by depth.
@@ -156,16 +158,20 @@ struct DrawPlan {
     double scale[3], translation[3];
 };
 
-inline constexpr std::uint32_t stream_batches = 8;
-inline constexpr std::uint32_t stream_quads = stream_batches * max_quads;
+inline constexpr std::uint32_t stream_quads = 16;
+inline constexpr std::uint32_t stream_batches = stream_quads;  ///< Of one quad each, with four lanes.
+/// One slot for each quad that waits, the primitive that is drawn, and some so that none is used again too early.
 inline constexpr std::uint32_t primitive_slots = 2 * stream_quads;
 
-/// Quads that wait for the fragment function.
+/// Quads that wait for the fragment function. A block is appended without branches, hence the four more.
 struct Stream {
-    FragmentBatch batches[stream_batches];
-    std::uint32_t places[stream_batches][max_quads];    ///< Of each quad in the tile's depth: first lane.
-    /// One bit for each lane: samples that the primitive covers and that passed the tests so far.
-    std::uint32_t alive[stream_batches][most_samples];
+    const PrimitiveData* primitives[stream_quads + 4];
+    std::int32_t x[stream_quads + 4], y[stream_quads + 4];
+    std::uint32_t live[stream_quads + 4];    ///< Pixels, 4 bits.
+    std::uint32_t places[stream_quads + 4];  ///< In the tile's depth: first lane.
+    /// With several samples, for each pixel one bit for each: samples that the primitive covers, and those of them that passed the
+    /// tests so far.
+    std::uint8_t covered[stream_quads + 4][4], alive[stream_quads + 4][4];
     std::uint32_t quads;
 };
 
@@ -175,6 +181,7 @@ struct alignas(64) Workspace {
     std::int32_t depth[most_samples][tile_pixels];
     std::int32_t stencil[most_samples][tile_pixels];
     Stream streams[most_samples];
+    FragmentBatch batches[stream_batches];
     std::byte* primitives;            ///< `primitive_slots` of the largest DrawPlan::primitive_bytes.
     std::uint64_t passed_samples;     ///< Counts up.
 };

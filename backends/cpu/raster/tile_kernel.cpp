@@ -18,8 +18,32 @@ void draw_record(TileRun& run, const Record& record, const std::byte* vertices) 
     }
 }
 
+/// Records of the tile in their order, some at a time: their memory is asked for before it is needed.
+struct Queue {
+    static constexpr std::uint32_t capacity = 64, ahead = 4;
+    const Record* records[capacity];
+    const std::byte* vertices[capacity];
+    std::uint32_t count = 0;
+
+    void push(TileRun& run, const Record& record, const std::byte* vertex_memory) {
+        __builtin_prefetch(&record);
+        records[count] = &record, vertices[count] = vertex_memory;
+        if (++count == capacity) drain(run);
+    }
+    void drain(TileRun& run) {
+        for (std::uint32_t i = 0; i < count; ++i) {
+            if (i + ahead < count && run.draw && run.draw->shades)
+                for (int corner = 0; corner < 3; ++corner)
+                    __builtin_prefetch(vertices[i + ahead] + static_cast<std::size_t>(records[i + ahead]->vertex[corner]) * 16);
+            draw_record(run, *records[i], vertices[i]);
+        }
+        count = 0;
+    }
+};
+
 void draw_tile(const TileJob& job, std::uint32_t tile, Workspace& workspace) {
     TileRun run(job, tile, workspace);
+    Queue queue;
     for (std::uint32_t i = 0; i < job.chunk_count; ++i) {
         const ChunkView& chunk = job.chunks[i];
         const std::uint32_t* bin = nullptr;
@@ -29,9 +53,10 @@ void draw_tile(const TileJob& job, std::uint32_t tile, Workspace& workspace) {
         const std::uint32_t* const large_end = large + chunk.large_count;
         while (bin != bin_end || large != large_end) {
             const bool from_bin = large == large_end || (bin != bin_end && *bin < *large);
-            draw_record(run, chunk.records[from_bin ? *bin++ : *large++], chunk.vertices);
+            queue.push(run, chunk.records[from_bin ? *bin++ : *large++], chunk.vertices);
         }
     }
+    queue.drain(run);
     run.finish();
 }
 

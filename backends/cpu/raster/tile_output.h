@@ -64,6 +64,33 @@ inline void load_quad(const std::byte* top, std::uint32_t row_stride, std::uint3
     }
 }
 
+/// Texels of 32 bits of a batch whose quads lie inside of the target. Pixels that do not count are written back as they were: no
+/// other thread touches the tile, and a branch for each of them would cost more.
+/// @param keep  all bits in lanes that do not count
+inline void store_words(const QuadRows& rows, std::uint32_t row_stride, std::uint32_t quads, const std::uint32_t* words,
+                        const std::uint32_t* keep) {
+    for (std::uint32_t quad = 0; quad < quads; ++quad)
+        for (std::uint32_t row = 0; row < 2; ++row) {
+            std::byte* const texels = rows.top[quad] + row * static_cast<std::size_t>(row_stride);
+            std::uint64_t old, fresh, kept;
+            std::memcpy(&old, texels, 8);
+            std::memcpy(&fresh, words + 4 * quad + 2 * row, 8);
+            std::memcpy(&kept, keep + 4 * quad + 2 * row, 8);
+            fresh ^= (fresh ^ old) & kept;
+            std::memcpy(texels, &fresh, 8);
+        }
+}
+/// The same for a whole block of 4x4 pixels.
+inline void store_block_words(std::byte* texels, std::uint32_t row_stride, const std::uint32_t* words) {
+    for (std::uint32_t row = 0; row < 4; ++row) {
+        const std::uint32_t* const from = words + 8 * (row / 2) + 2 * (row & 1);
+        std::uint64_t left, right;
+        std::memcpy(&left, from, 8), std::memcpy(&right, from + 4, 8);
+        std::memcpy(texels, &left, 8), std::memcpy(texels + 8, &right, 8);
+        texels += row_stride;
+    }
+}
+
 /// What blend factors are made of.
 struct BlendInputs {
     Floats source[4], source1[4], destination[4], constant[4];

@@ -35,12 +35,15 @@ struct TileRun {
     std::int32_t* depth = nullptr;    ///< Where the draw tests depth.
     std::int32_t* stencil = nullptr;
     float depth_low = 0.0f, depth_high = 1.0f;
+    bool simple_depth = false;        ///< See Coverage::run_simple_blocks.
+    bool lowers_depth = false, raises_depth = false;  ///< What the draw writes may leave the bounds of a region there.
 
     // The record that is drawn.
     const Record* record = nullptr;
     const std::byte* vertex_memory = nullptr;
     const PrimitiveData* primitive = nullptr;
     std::uint32_t next_slot = 0;
+    std::uint32_t entered_regions = 0, fetched_regions = 0;  ///< One bit for each region: see enter_region.
     bool front = true;
 
     // Hierarchical depth: bounds of the depths of each region, and how many blocks were written since they were exact.
@@ -121,6 +124,8 @@ struct TileRun {
             stencil = memory.stencil[0];
             stencil_changed = true;
         }
+        lowers_depth = !keeps_farther(plan.compare), raises_depth = !keeps_nearer(plan.compare);
+        simple_depth = targets.samples == 1 && !draw->late_tests && !stencil;
         depth_low = plan.clamps ? plan.clamp_low : 0.0f;
         depth_high = plan.clamps ? plan.clamp_high : 1.0f;
     }
@@ -139,12 +144,12 @@ struct TileRun {
         return depth_key(targets.depth_layout, depth_at(x, y), depth_low, depth_high);
     }
 
-    void depth_written(std::int32_t block_x, std::int32_t block_y) {
-        const std::int32_t region = block_y / region_blocks * regions_across + block_x / region_blocks;
-        const rhi::CompareOperation operation = draw->depth_stencil.compare;
+    /// @param place  of a block, or of a quad in it
+    void depth_written(std::uint32_t place) {
+        const std::uint32_t region = (place >> 10) * regions_across + (place >> 6 & 3);
         ++region_writes[region];
-        if (!keeps_farther(operation)) region_low[region] = key_lowest;
-        if (!keeps_nearer(operation)) region_high[region] = key_highest;
+        if (lowers_depth) region_low[region] = key_lowest;
+        if (raises_depth) region_high[region] = key_highest;
     }
 
     void measure_region(std::int32_t region_x, std::int32_t region_y) {
@@ -211,50 +216,54 @@ struct TileRun {
         return *primitive;
     }
 
-    /// @param live     pixels of the quad, 4 bits
-    /// @param covered  samples of each pixel that the primitive covers; null with one sample
-    /// @param alive    16 bits for each sample: pixels of the block in which it passed so far; null with one sample
-    void append(std::uint32_t stream_index, std::int32_t x, std::int32_t y, std::uint32_t place, std::uint32_t live,
-                const std::uint32_t* covered, const std::uint32_t* alive, std::uint32_t quad_in_block) {
+    /// Asks for the lines of the color targets in a region that is drawn to for the first time, and in the one behind it, which
+    /// is likely to follow: stores would wait for them one after another otherwise.
+    [[gnu::noinline]] void enter_region(std::uint32_t region) {
+        entered_regions |= 1u << region;
+        if (targets.samples > 1) return;
+        for (std::uint32_t next = region; next < region + 2 && next < regions_across * regions_across; ++next) {
+            if (fetched_regions >> next & 1) continue;
+            fetched_regions |= 1u << next;
+            const std::int32_t x = static_cast<std::int32_t>(next % regions_across) * 16;
+            const std::int32_t y = static_cast<std::int32_t>(next / regions_across) * 16;
+            if (x >= width) continue;
+            const std::int32_t rows = height - y < 16 ? height - y : 16;
+            for (std::uint32_t i = 0; i < draw->color_count; ++i) {
+                const ColorTarget& target = targets.colors[draw->colors[i].target];
+                const std::byte* line = target.data + static_cast<std::size_t>(tile_y + y) * target.row_stride +
+                                        static_cast<std::size_t>(tile_x + x) * target.texel_bytes;
+                for (std::int32_t row = 0; row < rows; ++row, line += target.row_stride)
+                    for (std::uint32_t byte = 0; byte < 16 * target.texel_bytes; byte += 64) __builtin_prefetch(line + byte, 1);
+            }
+        }
+    }
+
+    /// The quads of a block of 4x4 pixels.
+    /// @param live     pixels, 16 bits
+    /// @param covered  for each pixel the samples that the primitive covers; null with one sample
+    /// @param alive    and those that passed the tests so far
+    [[gnu::always_inline]] void append_block(std::uint32_t stream_index, std::int32_t x, std::int32_t y, std::uint32_t place,
+                                             std::uint32_t live, const std::uint8_t* covered, const std::uint8_t* alive) {
         Stream& stream = memory.streams[stream_index];
-        const std::uint32_t quads_in_batch = job.lanes / 4;
-        const std::uint32_t index = stream.quads / quads_in_batch, quad = stream.quads % quads_in_batch;
-        FragmentBatch& batch = stream.batches[index];
-        if (quad == 0) {
-            batch.live = 0;
-            batch.sample_index = stream_index;
-            const bool single = draw->runs_per_sample && targets.samples > 1;
-            batch.sample_x = single ? static_cast<float>(sample_offset_x[stream_index]) / subpixels : 0.5f;
-            batch.sample_y = single ? static_cast<float>(sample_offset_y[stream_index]) / subpixels : 0.5f;
-            store(batch.sample_mask_in, ints(single ? 1 << stream_index : 1));
-            if (draw->uses_centroid) {
-                store(batch.centroid_x, floats(single ? batch.sample_x : 0.5f));
-                store(batch.centroid_y, floats(single ? batch.sample_y : 0.5f));
+        if (stream.quads + 4 > stream_quads) flush_stream(stream_index);
+        const std::uint32_t region = (place >> 10) * regions_across + (place >> 6 & 3);
+        if ((entered_regions >> region & 1) == 0) enter_region(region);
+        const PrimitiveData* const from = &current_primitive();
+        std::uint32_t next = stream.quads;
+        for (std::uint32_t quad = 0; quad < 4; ++quad) {
+            const std::uint32_t pixels = live >> (4 * quad) & 15;
+            stream.primitives[next] = from;
+            stream.x[next] = x + 2 * static_cast<std::int32_t>(quad & 1);
+            stream.y[next] = y + 2 * static_cast<std::int32_t>(quad >> 1);
+            stream.live[next] = pixels;
+            stream.places[next] = place + 4 * quad;
+            if (covered) {
+                std::memcpy(stream.covered[next], covered + 4 * quad, 4);
+                std::memcpy(stream.alive[next], alive + 4 * quad, 4);
             }
-            for (std::uint32_t& bits : stream.alive[index]) bits = 0;
+            next += pixels != 0;
         }
-        batch.primitives[quad] = &current_primitive();
-        batch.x[quad] = x, batch.y[quad] = y;
-        batch.live |= live << (4 * quad);
-        stream.places[index][quad] = place;
-        if (covered && !draw->runs_per_sample) {
-            for (std::uint32_t i = 0; i < 4; ++i) {
-                const std::uint32_t lane = 4 * quad + i, bits = covered[i];
-                batch.sample_mask_in[lane] = bits;
-                if (draw->uses_centroid && bits != 15) {
-                    // The first covered sample stands for the centroid, as the specification allows.
-                    const int first = bits ? __builtin_ctz(bits) : -1;
-                    batch.centroid_x[lane] = first < 0 ? 0.5f : static_cast<float>(sample_offset_x[first]) / subpixels;
-                    batch.centroid_y[lane] = first < 0 ? 0.5f : static_cast<float>(sample_offset_y[first]) / subpixels;
-                }
-            }
-            for (std::uint32_t sample = 0; sample < most_samples; ++sample)
-                stream.alive[index][sample] |= (alive[sample] >> (4 * quad_in_block) & 15) << (4 * quad);
-        } else {
-            stream.alive[index][stream_index] |= live << (4 * quad);
-        }
-        ++stream.quads;
-        if (stream.quads == stream_batches * quads_in_batch) flush_stream(stream_index);
+        stream.quads = next;
     }
 
     void flush() {
@@ -266,33 +275,115 @@ struct TileRun {
         Stream& stream = memory.streams[stream_index];
         const std::uint32_t quads_in_batch = job.lanes / 4;
         const std::uint32_t count = (stream.quads + quads_in_batch - 1) / quads_in_batch;
-        FragmentBatch& last = stream.batches[count - 1];
-        const std::uint32_t used = stream.quads - (count - 1) * quads_in_batch;
-        for (std::uint32_t quad = used; quad < max_quads; ++quad) {
-            last.primitives[quad] = last.primitives[0];
-            last.x[quad] = last.x[0], last.y[quad] = last.y[0];
-            stream.places[count - 1][quad] = stream.places[count - 1][0];
+        for (std::uint32_t quad = stream.quads; quad % quads_in_batch != 0; ++quad) {
+            stream.primitives[quad] = stream.primitives[0];
+            stream.x[quad] = stream.x[0], stream.y[quad] = stream.y[0];
+            stream.places[quad] = stream.places[0];
+            stream.live[quad] = 0;
+            std::memset(stream.covered[quad], 0, 4), std::memset(stream.alive[quad], 0, 4);
         }
-        draw->fragment(draw->context, stream.batches, count);
-        for (std::uint32_t i = 0; i < count; ++i) resolve(stream, stream_index, i, i + 1 == count ? used : quads_in_batch);
+        for (std::uint32_t i = 0; i < count; ++i) fill_batch(memory.batches[i], stream, stream_index, i * quads_in_batch, quads_in_batch);
+        draw->fragment(draw->context, memory.batches, count);
+        for (std::uint32_t i = 0; i < count; ++i) {
+            if (draw->plain_results)
+                write_plain(memory.batches[i], stream.places + i * quads_in_batch, quads_in_batch);
+            else
+                resolve(memory.batches[i], stream, stream_index, i * quads_in_batch, quads_in_batch);
+        }
         stream.quads = 0;
     }
 
+    [[gnu::always_inline]] void fill_batch(FragmentBatch& batch, const Stream& stream, std::uint32_t stream_index,
+                                           std::uint32_t first, std::uint32_t quads) {
+        std::memcpy(batch.primitives, stream.primitives + first, sizeof(batch.primitives));
+        std::memcpy(batch.x, stream.x + first, sizeof(batch.x));
+        std::memcpy(batch.y, stream.y + first, sizeof(batch.y));
+        batch.live = 0;
+        for (std::uint32_t quad = 0; quad < max_quads; ++quad)
+            batch.live |= quad < quads ? stream.live[first + quad] << (4 * quad) : 0;
+        batch.sample_index = stream_index;
+        const bool single = draw->runs_per_sample;
+        batch.sample_x = single ? static_cast<float>(sample_offset_x[stream_index]) / subpixels : 0.5f;
+        batch.sample_y = single ? static_cast<float>(sample_offset_y[stream_index]) / subpixels : 0.5f;
+        store(batch.sample_mask_in, ints(single ? 1 << stream_index : 1));
+        if (draw->uses_centroid) store(batch.centroid_x, floats(batch.sample_x)), store(batch.centroid_y, floats(batch.sample_y));
+        if (targets.samples == 1 || single) return;
+        for (std::uint32_t lane = 0; lane < 4 * quads; ++lane) {
+            const std::uint32_t bits = stream.covered[first + lane / 4][lane & 3];
+            batch.sample_mask_in[lane] = bits;
+            if (draw->uses_centroid && bits != 15 && bits != 0) {
+                // The first covered sample stands for the centroid, as the specification allows.
+                const int sample = __builtin_ctz(bits);
+                batch.centroid_x[lane] = static_cast<float>(sample_offset_x[sample]) / subpixels;
+                batch.centroid_y[lane] = static_cast<float>(sample_offset_y[sample]) / subpixels;
+            }
+        }
+    }
+
+    /// The frequent case of `resolve`: one sample, tested before, nothing blended.
+    void write_plain(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t quads) {
+        const std::uint32_t live = batch.live;
+        // Quads of unfilled batches repeat others, without a live pixel.
+        bool inside = width % 2 == 0 && height % 2 == 0, block = quads == 4 && live == 0xffff && places[0] % 16 == 0;
+        for (std::uint32_t quad = 0; quad < quads; ++quad)
+            block = block && places[quad] == places[0] + 4 * quad;
+        alignas(64) std::uint32_t keep[16];
+        store(keep, select(lanes_of(live), ints(0), ints(-1)));
+        std::size_t offsets[4] = {};
+        std::uint32_t row_stride = 0, texel_bytes = 0;
+        for (std::uint32_t i = 0; i < draw->color_count; ++i) {
+            const ColorPlan& plan = draw->colors[i];
+            const ColorTarget& target = targets.colors[plan.target];
+            alignas(64) std::uint32_t packed[4][16];
+            const std::uint32_t(*words)[16] = batch.colors[plan.output];
+            if (!plan.as_it_is) {
+                pack_colors(plan, target, *job.srgb, batch, packed);
+                words = packed;
+            }
+            // Most targets of a pass have rows of the same size.
+            if (target.row_stride != row_stride || target.texel_bytes != texel_bytes) {
+                row_stride = target.row_stride, texel_bytes = target.texel_bytes;
+                for (std::uint32_t quad = 0; quad < 4; ++quad)
+                    offsets[quad] = static_cast<std::size_t>(batch.y[quad]) * row_stride +
+                                    static_cast<std::size_t>(batch.x[quad]) * texel_bytes;
+            }
+            QuadRows rows;
+            for (std::uint32_t quad = 0; quad < 4; ++quad) rows.top[quad] = target.data + offsets[quad];
+            if (target.texel_bytes == 4 && inside) {
+                if (block)
+                    store_block_words(rows.top[0], target.row_stride, words[0]);
+                else
+                    store_words(rows, target.row_stride, quads, words[0], keep);
+                continue;
+            }
+            for (std::uint32_t quad = 0; quad < quads; ++quad)
+                if (const std::uint32_t pixels = live >> (4 * quad) & 15)
+                    store_quad(rows.top[quad], target.row_stride, target.texel_bytes, pixels, words, 4 * quad);
+        }
+    }
+
     /// Tests and writes the results of one batch.
-    void resolve(Stream& stream, std::uint32_t stream_index, std::uint32_t index, std::uint32_t quads) {
-        FragmentBatch& batch = stream.batches[index];
+    void resolve(const FragmentBatch& batch, const Stream& stream, std::uint32_t stream_index, std::uint32_t first_quad,
+                 std::uint32_t quads) {
         const std::uint32_t used = quads == 4 ? 0xffffu : (1u << (4 * quads)) - 1;
         const std::uint32_t live = batch.live & used;
         if (live == 0) return;
+        const std::uint32_t* const places = stream.places + first_quad;
         const bool several = targets.samples > 1 && !draw->runs_per_sample;
         const std::uint32_t first = several ? 0 : stream_index, end = several ? targets.samples : stream_index + 1;
         bool conflict = false;
         for (std::uint32_t a = 1; a < quads; ++a)
-            for (std::uint32_t b = 0; b < a; ++b) conflict |= stream.places[index][a] == stream.places[index][b];
+            for (std::uint32_t b = 0; b < a; ++b) conflict |= places[a] == places[b];
         std::uint32_t masks[most_samples] = {};
         std::uint32_t any = 0;
         for (std::uint32_t sample = first; sample < end; ++sample) {
-            std::uint32_t mask = stream.alive[index][sample] & live;
+            std::uint32_t mask = live;
+            if (several) {
+                mask = 0;
+                for (std::uint32_t lane = 0; lane < 4 * quads; ++lane)
+                    mask |= (stream.alive[first_quad + lane / 4][lane & 3] >> sample & 1u) << lane;
+                mask &= live;
+            }
             if (draw->writes_sample_mask)
                 mask &= ~mask_of(equal(load(batch.sample_mask_out) & ints(1 << sample), ints(0)));
             if (draw->alpha_to_coverage) {
@@ -300,7 +391,7 @@ struct TileRun {
                 mask &= mask_of(less(floats(limit), floats_of_bits(load(batch.colors[0][3]))));
             }
             if (draw->late_tests && mask) {
-                mask = late_test(stream, index, sample, mask, conflict || stencil, quads);
+                mask = late_test(batch, places, sample, mask, conflict || stencil, quads);
                 memory.passed_samples += static_cast<std::uint32_t>(__builtin_popcount(mask));
             }
             masks[sample] = mask;
@@ -310,10 +401,9 @@ struct TileRun {
         for (std::uint32_t i = 0; i < draw->color_count; ++i) write_color(draw->colors[i], batch, masks, first, end, conflict);
     }
 
-    std::uint32_t late_test(Stream& stream, std::uint32_t index, std::uint32_t sample, std::uint32_t mask, bool one_by_one,
-                            std::uint32_t quads) {
+    std::uint32_t late_test(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t sample, std::uint32_t mask,
+                            bool one_by_one, std::uint32_t quads) {
         if (!depth && !stencil) return mask;
-        const FragmentBatch& batch = stream.batches[index];
         Ints key = ints(0);
         if (depth) {
             alignas(64) float z[16];
@@ -333,7 +423,6 @@ struct TileRun {
             key = depth_key(targets.depth_layout, load(z), depth_low, depth_high);
         }
         alignas(64) std::int32_t depths[16] = {}, stencils[16] = {};
-        const std::uint32_t* const places = stream.places[index];
         const auto test = [&](std::uint32_t first, std::uint32_t end, std::uint32_t asked) -> std::uint32_t {
             for (std::uint32_t quad = first; quad < end && quad < max_quads; ++quad) {
                 if (depth) std::memcpy(depths + 4 * quad, memory.depth[sample] + places[quad], 16);
@@ -345,8 +434,7 @@ struct TileRun {
             for (std::uint32_t quad = first; quad < end && quad < max_quads; ++quad) {
                 if (depth && draw->depth_stencil.depth_write && (passed >> (4 * quad) & 15) != 0) {
                     std::memcpy(memory.depth[sample] + places[quad], depths + 4 * quad, 16);
-                    const auto block = static_cast<std::int32_t>(places[quad] / 16);
-                    depth_written(block % tile_blocks, block / tile_blocks);
+                    depth_written(places[quad]);
                 }
                 if (stencil) std::memcpy(memory.stencil[sample] + places[quad], stencils + 4 * quad, 16);
             }

@@ -95,10 +95,10 @@ void run_vertices(const Segment& segment, const QueuedDraw& draw, const Kernels&
 
     const std::uint32_t output_slots = std::max(program.output_slots, first_user_slot);
     const std::size_t batch_words = static_cast<std::size_t>(output_slots) * max_lanes;
-    scratch.outputs.reserve(batches_at_once * batch_words * sizeof(float), 0);
+    // Lanes that the vertex function does not write are read, though nothing follows from them: they hold some number at least.
+    if (scratch.outputs.reserve(batches_at_once * batch_words * sizeof(float), 0))
+        std::memset(scratch.outputs.data(), 0, batches_at_once * batch_words * sizeof(float));
     auto* const outputs = reinterpret_cast<float*>(scratch.outputs.data());
-    // Lanes that the vertex function does not write are read, though nothing follows from them.
-    std::memset(outputs, 0, batches_at_once * batch_words * sizeof(float));
     scratch.batches.resize(batches_at_once);
     std::vector<const float*> rows(draw.row_count, zero_row);
 

@@ -131,6 +131,7 @@ TEST_P(GlFaultTest, RebuildsADamagedProgramCache) {
         return !device || computes(*device, 7);
     };
     ASSERT_TRUE(run());
+    if (IsSkipped()) return;
     const auto entries = [&] {
         std::vector<std::filesystem::path> files;
         for (const auto& entry : std::filesystem::recursive_directory_iterator(folder.path()))
@@ -138,7 +139,6 @@ TEST_P(GlFaultTest, RebuildsADamagedProgramCache) {
                 files.push_back(entry.path());
         return files;
     };
-    if (entries().empty()) GTEST_SKIP() << "no device of this kind";
     ASSERT_EQ(entries().size(), 1u);
     const std::uintmax_t size = std::filesystem::file_size(entries()[0]);
     ASSERT_TRUE(run());
@@ -190,7 +190,8 @@ TEST(GlMessages, ReachTheCallback) {
     auto device = backend->create_device({.spec = {.name = "gl"}, .desc = &desc, .report = [&](const Message& message) {
         errors += message.severity == MessageSeverity::error;
     }});
-    if (!device) GTEST_SKIP() << device.error().message();
+    if (!device && device.error().code == ErrorCode::not_found) GTEST_SKIP() << device.error().message();
+    ASSERT_TRUE(device) << device.error().message();
     auto first = expect((*device)->create_buffer({.size = 64, .usage = BufferUsage::copy_source, .name = "small"}));
     auto second = expect((*device)->create_buffer({.size = 64, .usage = BufferUsage::copy_destination, .name = "small"}));
     CommandStream stream;

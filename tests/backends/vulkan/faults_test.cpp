@@ -119,6 +119,7 @@ TEST(VulkanFaults, SaysWhatIsWrongWithASpec) {
     const auto unknown_mode = instance.create_device({.backend = "vulkan:ancient"});
     ASSERT_FALSE(unknown_mode);
     EXPECT_NE(unknown_mode.error().message().find("renderpass"), std::string::npos) << unknown_mode.error().message();
+    if (instance.adapters().empty()) GTEST_SKIP() << "no Vulkan device";
     const auto unknown_device = instance.create_device({.backend = "vulkan", .adapter = 4711});
     ASSERT_FALSE(unknown_device);
     EXPECT_NE(unknown_device.error().message().find("4711"), std::string::npos) << unknown_device.error().message();

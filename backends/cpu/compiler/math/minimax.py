@@ -5,7 +5,8 @@
 Method: the Remez exchange algorithm for a weighted error (Cheney, "Introduction to Approximation Theory", chapter 3),
 in decimal arithmetic of 50 digits. Coefficients are then rounded to single precision one after another, from the one of
 the lowest power on; after each rounding those that remain are fitted again to what the rounded ones leave (or simply
-rounded, where that is better). The errors that it prints are those of the polynomial with rounded coefficients, evaluated exactly.
+rounded, where that is better). The errors that it prints
+are those of the polynomial with rounded coefficients, evaluated exactly.
 
 exponentials.cpp, trigonometry.cpp and so on hold what it prints. It fails if one of them does not.
 """
@@ -171,7 +172,7 @@ def fit(file, name, function, weight, low, high, degree, points=400):
 
 
 def split(file, name, value, bits):
-    """Prints a constant as a sum of single precision numbers, each but the last of so few bits that products are exact."""
+    """Prints a constant as a sum of single precision numbers, each but the last of the bits given."""
     parts = []
     for count in bits:
         scale = Decimal(2) ** (count - 1 - int((abs(value).ln() / LN2).to_integral_value(rounding="ROUND_FLOOR")))
@@ -204,7 +205,8 @@ def main():
     fit("trigonometry", "(sin(r) - r) / r^3 of r^2", *odd(sin), tiny, PI**2 / 16, 2)
     fit("trigonometry", "(cos(r) - 1 + r^2 / 2) / r^4 of r^2", lambda z: (cos(z.sqrt()) - 1 + z / 2) / z**2,
         lambda z: z**2 / cos(z.sqrt()), Decimal("1e-8"), PI**2 / 16, 2)
-    split("trigonometry", "pi", PI, [8, 8, 8])
+    split("trigonometry", "pi", PI, [8, 8, 5])
+    split("trigonometry", "pi, finer", PI, [8, 8, 5, 8])
     fit("inverse_trigonometry", "(asin(s) - s) / s^3 of s^2", *odd(asin), tiny, ONE / 4, 4)
     fit("inverse_trigonometry", "(atan(t) - t) / t^3 of t^2", *odd(atan), tiny, ONE, 8)
     fit("hyperbolics", "(sinh(x) - x) / x^3 of x^2", *odd(sinh), tiny, ONE, 3)

@@ -5,24 +5,27 @@
 
 // Sine and cosine: x is taken to the nearest multiple of pi (for the cosine: the nearest odd multiple of pi / 2) and a
 // rest in
-// [-pi/2, pi/2], whose sine a single polynomial gives; nothing has to be selected. The multiple is subtracted in four
-// parts, the first three of so few bits that their products are exact, all of one sign so that -0 stays -0 (Cody and
-// Waite, "Software Manual for the Elementary Functions", 1980). Coefficients and parts: minimax.py.
+// [-pi/2, pi/2], whose sine a single polynomial gives; nothing has to be selected. The multiple is subtracted in parts
+// (Cody and Waite, "Software Manual for the Elementary Functions", 1980), the first three of so few bits that neither
+// their products nor the differences round where the sine is steep; the last difference is the only one that does. They
+// have one sign, so that -0 stays -0. Coefficients and parts: minimax.py.
 
 namespace nacre::cpu {
 
 namespace {
 
-constexpr double pi_parts[] = {0x1.92p+1, 0x1.fap-11, 0x1.54p-19, 0x1.10b462p-29};
+constexpr double pi_parts[] = {0x1.92p+1, 0x1.fap-11, 0x1.5p-19, 0x1.110b46p-25};
+/// For the tangent, which near its poles shows every error of the rest.
+constexpr double finer_pi_parts[] = {0x1.92p+1, 0x1.fap-11, 0x1.5p-19, 0x1.1p-25, 0x1.0b4612p-33};
 
 constexpr float sine_half_turn[] = {-0x1.55554cp-3f, 0x1.110edap-7f, -0x1.9f70eep-13f, 0x1.5dc8c4p-19f};
 constexpr float sine_quarter_turn[] = {-0x1.555546p-3f, 0x1.110778p-7f, -0x1.995408p-13f};
 constexpr float cosine_quarter_turn[] = {0x1.55554ap-5f, -0x1.6c0c28p-10f, 0x1.99e80cp-16f};
 
 /// x - multiple * pi * factor, for a factor that is a power of two.
-Term subtract_pi(const Term& x, const Term& multiple, double factor) {
+Term subtract_pi(const Term& x, const Term& multiple, double factor, std::span<const double> parts) {
     Term rest = x;
-    for (const double part : pi_parts) rest = multiply_add(multiple, -part * factor, rest);
+    for (const double part : parts) rest = multiply_add(multiple, -part * factor, rest);
     return rest;
 }
 
@@ -39,7 +42,7 @@ Term sign_bit(const Term& x) {
 
 /// Sine of x - multiple * pi, with its sign changed where the lowest bit of `flips` is one.
 Term reduced_sine(const Term& x, const Term& multiple, const Term& flips) {
-    const Term rest = subtract_pi(x, multiple, 1);
+    const Term rest = subtract_pi(x, multiple, 1, pi_parts);
     // The magnitude and the sign go separate ways, because the polynomial would lose the sign of -0. The bound is a bit
     // above pi / 2, for what the rounding of x / pi does to large x; it matters only where the reduction has lost all
     // precision.
@@ -63,7 +66,7 @@ Term cosine(const Term& x) {
 
 Term tangent(const Term& x) {
     const Rounded quarter_turns = round_to_whole(x * (2 * std::numbers::inv_pi));
-    const Term rest = subtract_pi(x, quarter_turns.number, 0.5);
+    const Term rest = subtract_pi(x, quarter_turns.number, 0.5, finer_pi_parts);
     const Term magnitude = abs(rest);
     const Term square = magnitude * magnitude;
     const Term sine = odd_polynomial(magnitude, square, sine_quarter_turn);

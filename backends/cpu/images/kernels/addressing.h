@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From coordinates to texels and weights. Source: Vulkan specification, "Texel Coordinate Systems", "Wrapping Operation", "Texel
-// Filtering".
+// From coordinates to texels and weights. Source: Vulkan specification, "Texel Coordinate Systems", "Wrapping
+// Operation", "Texel Filtering".
 #pragma once
 
 #include "backends/cpu/images/kernels/invocation.h"
@@ -8,14 +8,15 @@
 namespace nacre::cpu::NACRE_KERNEL_NAMESPACE {
 namespace {
 
-/// The texels of one filter footprint. Tap 0 is (i0, j0, k0); bit 0 of the number stands for i1, bit 1 for j1, bit 2 for k1.
+/// The texels of one filter footprint. Tap 0 is (i0, j0, k0); bit 0 of the number stands for i1, bit 1 for j1, bit 2
+/// for k1.
 template <int W>
 struct Taps {
     int count = 1;
     bool has_border = false;
     Place<W> places[8];
-    Floats<W> weights[8];   ///< Not set where count is 1.
-    Ints<W> is_border[8];   ///< Set where has_border.
+    Floats<W> weights[8];  ///< Not set where count is 1.
+    Ints<W> is_border[8];  ///< Set where has_border.
     /// Cubes: taps at a corner of the cube, where three faces meet and a fourth texel does not exist.
     bool has_corner = false;
     Ints<W> is_corner[4];
@@ -62,8 +63,8 @@ NACRE_INLINE void wrap(Ints<W>& i, Ints<W>& is_border, std::int32_t n, rhi::Addr
     i = clamp<W>(i, 0, n - 1);
 }
 
-/// Coordinate in texels, in a range in which whole numbers are exact. Periods are taken off before the multiplication, where no
-/// bits are lost by it.
+/// Coordinate in texels, in a range in which whole numbers are exact. Periods are taken off before the multiplication,
+/// where no bits are lost by it.
 template <int W>
 NACRE_INLINE Floats<W> unnormalized(Floats<W> s, std::int32_t n, rhi::AddressMode mode) {
     const auto size = static_cast<float>(n);
@@ -96,8 +97,10 @@ template <int W>
 NACRE_INLINE AxisTaps<W> nearest_axis(Floats<W> s, std::int32_t n, rhi::AddressMode mode, const Ints<W>* offset) {
     AxisTaps<W> taps;
     Ints<W> i = truncate<W>(floor_small<W>(unnormalized<W>(s, n, mode)));
-    if (offset != nullptr) i += bounded_offset<W>(*offset);
-    else if (mode == rhi::AddressMode::repeat) i = minimum<W>(i, splat<W>(n - 1));  // Just below a period rounds up to it.
+    if (offset != nullptr)
+        i += bounded_offset<W>(*offset);
+    else if (mode == rhi::AddressMode::repeat)
+        i = minimum<W>(i, splat<W>(n - 1));  // Just below a period rounds up to it.
     taps.first = i;
     wrap<W>(taps.first, taps.first_is_border, n, mode, offset != nullptr);
     return taps;
@@ -117,8 +120,8 @@ struct AddressModes {
 
 /// Footprint in an image that is no cube. `spatial` is 1 to 3; `slice` the layer where it is below 3.
 template <int W>
-[[gnu::noinline]] void make_taps(const Source& source, const Floats<W>* coordinates, Ints<W> slice, int spatial, bool is_linear,
-                                 AddressModes modes, const Ints<W>* offsets, Taps<W>& taps) {
+[[gnu::noinline]] void make_taps(const Source& source, const Floats<W>* coordinates, Ints<W> slice, int spatial,
+                                 bool is_linear, AddressModes modes, const Ints<W>* offsets, Taps<W>& taps) {
     const Ints<W>* offset_y = offsets != nullptr ? offsets + 1 : nullptr;
     const Ints<W>* offset_z = offsets != nullptr ? offsets + 2 : nullptr;
     const auto is_border = [](rhi::AddressMode mode) { return mode == rhi::AddressMode::clamp_to_border; };
@@ -157,7 +160,8 @@ template <int W>
         if (spatial == 3) weight = weight * (second_z ? z.weight : 1.0f - z.weight);
         taps.weights[tap] = weight;
         if (taps.has_border) {
-            Ints<W> border = (second_x ? x.second_is_border : x.first_is_border) | (second_y ? y.second_is_border : y.first_is_border);
+            Ints<W> border = (second_x ? x.second_is_border : x.first_is_border) |
+                             (second_y ? y.second_is_border : y.first_is_border);
             if (spatial == 3) border |= second_z ? z.second_is_border : z.first_is_border;
             taps.is_border[tap] = border;
         }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cube maps: faces of directions, and footprints that reach over the edges of faces. Source: Vulkan specification, "Cube Map Face
-// Selection", "Cube Map Edge Handling".
+// Cube maps: faces of directions, and footprints that reach over the edges of faces. Source: Vulkan specification,
+// "Cube Map Face Selection", "Cube Map Edge Handling".
 #pragma once
 
 #include "backends/cpu/images/kernels/addressing.h"
@@ -19,7 +19,7 @@ struct CubeProjection {
 /// Components (sc, tc, rc) of a vector for faces that are known, rc with the sign of the face.
 template <int W>
 NACRE_INLINE void face_components(Ints<W> face, const Floats<W>* r, Floats<W>& sc, Floats<W>& tc, Floats<W>& rc) {
-    const Ints<W> is_x = face < 2, is_z = face > 3, is_negative = (face & 1) != 0;
+    const Ints<W> is_x = face<2, is_z = face> 3, is_negative = (face & 1) != 0;
     const Floats<W> x = r[0], y = r[1], z = r[2];
     // +X: -z  -X: z  +-Y: x  +Z: x  -Z: -x
     const Floats<W> s_of_x = is_negative ? z : -z, s_of_z = is_negative ? -x : x;
@@ -64,8 +64,8 @@ struct CubeEdges {
     CubeEdge edges[6][4];  // Left (x < 0), right, top (y < 0), bottom.
 };
 
-/// From the axes of the faces: the texel just over an edge lies on the face of the axis that is crossed, at its border towards the
-/// old face.
+/// From the axes of the faces: the texel just over an edge lies on the face of the axis that is crossed, at its border
+/// towards the old face.
 constexpr CubeEdges make_cube_edges() {
     // s, t and outward axis of each face.
     constexpr int axes[6][3][3] = {
@@ -89,8 +89,8 @@ constexpr CubeEdges make_cube_edges() {
                     towards_old += axes[to][axis][c] * axes[face][2][c];
                     towards_kept += axes[to][axis][c] * axes[face][kept][c];
                 }
-                rules[axis] = towards_old > 0   ? CubeEdge::last
-                              : towards_old < 0 ? CubeEdge::zero
+                rules[axis] = towards_old > 0    ? CubeEdge::last
+                              : towards_old < 0  ? CubeEdge::zero
                               : towards_kept > 0 ? CubeEdge::along
                                                  : CubeEdge::reversed;
             }
@@ -110,7 +110,8 @@ NACRE_INLINE std::int32_t apply_rule(CubeEdge::Rule rule, std::int32_t along, st
     }
 }
 
-/// Moves texels that lie one step outside of their face to the neighboring face. Returns true for those outside in both directions.
+/// Moves texels that lie one step outside of their face to the neighboring face. Returns true for those outside in both
+/// directions.
 template <int W>
 [[gnu::noinline]] void cross_edges(std::int32_t n, Ints<W>& x, Ints<W>& y, Ints<W>& face, Ints<W>& is_corner) {
     is_corner = splat<W>(0);
@@ -135,11 +136,13 @@ template <int W>
 
 /// Footprint on a cube. `first_slice` is the slice of face 0 of each lane's cube.
 template <int W>
-[[gnu::noinline]] void make_cube_taps(const Source& source, const CubeProjection<W>& cube, Ints<W> first_slice, bool is_linear,
-                                      Taps<W>& taps) {
+[[gnu::noinline]] void make_cube_taps(const Source& source, const CubeProjection<W>& cube, Ints<W> first_slice,
+                                      bool is_linear, Taps<W>& taps) {
     const std::int32_t n = source.width;
     taps.has_border = false, taps.has_corner = false;
-    const auto texels = [&](Floats<W> s) { return clamp<W>(s * static_cast<float>(n), splat<W>(0.0f), splat<W>(static_cast<float>(n))); };
+    const auto texels = [&](Floats<W> s) {
+        return clamp<W>(s * static_cast<float>(n), splat<W>(0.0f), splat<W>(static_cast<float>(n)));
+    };
     if (!is_linear) {
         taps.count = 1;
         taps.places[0] = place_texel<W>(source, clamp<W>(truncate<W>(texels(cube.s)), 0, n - 1),
@@ -162,8 +165,8 @@ template <int W>
         taps.weights[tap] = ((tap & 1) != 0 ? fx : 1.0f - fx) * ((tap & 2) != 0 ? fy : 1.0f - fy);
     }
     if (!taps.has_corner) return;
-    // The texel that does not exist counts as the mean of the three others. A face of one texel has several corners in one footprint:
-    // the others share their weight.
+    // The texel that does not exist counts as the mean of the three others. A face of one texel has several corners in
+    // one footprint: the others share their weight.
     Floats<W> lost = splat<W>(0.0f), remaining = splat<W>(0.0f);
     for (int tap = 0; tap < 4; ++tap) {
         lost = taps.is_corner[tap] ? lost + taps.weights[tap] : lost;

@@ -29,7 +29,8 @@ struct Invocation {
 
 template <int W>
 NACRE_INLINE void write_result(const Invocation& call, const Floats<W>* channels, Ints<W> live) {
-    for (int c = 0; c < 4; ++c) store_lanes<W>(call.arguments->result[c] + call.first_lane, (Ints<W>)channels[c] & live);
+    for (int c = 0; c < 4; ++c)
+        store_lanes<W>(call.arguments->result[c] + call.first_lane, (Ints<W>)channels[c] & live);
 }
 template <int W>
 NACRE_INLINE void write_zeros(const Invocation& call) {
@@ -38,9 +39,9 @@ NACRE_INLINE void write_zeros(const Invocation& call) {
 
 /// Shape of the coordinates of a view.
 struct Axes {
-    int spatial = 2;         ///< Coordinates besides the layer; cubes: 3.
+    int spatial = 2;  ///< Coordinates besides the layer; cubes: 3.
     bool is_cube = false;
-    bool has_layers = false; ///< A layer follows.
+    bool has_layers = false;  ///< A layer follows.
 };
 NACRE_INLINE Axes axes_of(rhi::ViewDimension dimension) {
     using enum rhi::ViewDimension;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Arithmetic on all lanes at once. Nothing here depends on the lane count or the instruction set: every result is the same to the
-// last bit everywhere.
+// Arithmetic on all lanes at once. Nothing here depends on the lane count or the instruction set: every result is the
+// same to the last bit everywhere.
 #pragma once
 
 #include "backends/cpu/images/kernels/simd_gather.h"
@@ -36,9 +36,12 @@ NACRE_INLINE Ints<W> splat(std::int32_t x) {
 
 template <int W>
 NACRE_INLINE Ints<W> lane_numbers() {
-    if constexpr (W == 4) return Ints<W>{0, 1, 2, 3};
-    else if constexpr (W == 8) return Ints<W>{0, 1, 2, 3, 4, 5, 6, 7};
-    else return Ints<W>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    if constexpr (W == 4)
+        return Ints<W>{0, 1, 2, 3};
+    else if constexpr (W == 8)
+        return Ints<W>{0, 1, 2, 3, 4, 5, 6, 7};
+    else
+        return Ints<W>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 }
 template <int W>
 NACRE_INLINE Ints<W> mask_of_bits(std::uint32_t bits) {
@@ -99,7 +102,8 @@ template <int W>
 NACRE_INLINE Floats<W> round_small(Floats<W> x) {
     return (x + 12582912.0f) - 12582912.0f;
 }
-/// x - floor(x) in [0, 1]; 0 for infinities and NaN. 1 only where x is so little below a whole number that it rounds up.
+/// x - floor(x) in [0, 1]; 0 for infinities and NaN. 1 only where x is so little below a whole number that it rounds
+/// up.
 template <int W>
 NACRE_INLINE Floats<W> fraction(Floats<W> x) {
     const Ints<W> has_fraction = absolute<W>(x) < 8388608.0f;
@@ -107,8 +111,8 @@ NACRE_INLINE Floats<W> fraction(Floats<W> x) {
     return small - floor_small<W>(small);
 }
 
-/// Logarithm to base 2 within 2e-7 + 1 ulp; 0 and NaN (whose bits differ between machines) give -infinity, infinity gives 128.
-/// x >= 0.
+/// Logarithm to base 2 within 2e-7 + 1 ulp; 0 and NaN (whose bits differ between machines) give -infinity, infinity
+/// gives 128. x >= 0.
 template <int W>
 NACRE_INLINE Floats<W> log2_lanes(Floats<W> x) {
     const Ints<W> bits = (Ints<W>)x;
@@ -127,23 +131,25 @@ NACRE_INLINE Floats<W> log2_lanes(Floats<W> x) {
 template <int W>
 NACRE_INLINE Floats<W> difference_x(Floats<W> v) {
     if constexpr (W == 4) {
-        return __builtin_shuffle(v, Ints<W>{1, 1, 3, 3}) - __builtin_shuffle(v, Ints<W>{0, 0, 2, 2});
+        return __builtin_shufflevector(v, v, 1, 1, 3, 3) - __builtin_shufflevector(v, v, 0, 0, 2, 2);
     } else if constexpr (W == 8) {
-        return __builtin_shuffle(v, Ints<W>{1, 1, 3, 3, 5, 5, 7, 7}) - __builtin_shuffle(v, Ints<W>{0, 0, 2, 2, 4, 4, 6, 6});
+        return __builtin_shufflevector(v, v, 1, 1, 3, 3, 5, 5, 7, 7) -
+               __builtin_shufflevector(v, v, 0, 0, 2, 2, 4, 4, 6, 6);
     } else {
-        return __builtin_shuffle(v, Ints<W>{1, 1, 3, 3, 5, 5, 7, 7, 9, 9, 11, 11, 13, 13, 15, 15}) -
-               __builtin_shuffle(v, Ints<W>{0, 0, 2, 2, 4, 4, 6, 6, 8, 8, 10, 10, 12, 12, 14, 14});
+        return __builtin_shufflevector(v, v, 1, 1, 3, 3, 5, 5, 7, 7, 9, 9, 11, 11, 13, 13, 15, 15) -
+               __builtin_shufflevector(v, v, 0, 0, 2, 2, 4, 4, 6, 6, 8, 8, 10, 10, 12, 12, 14, 14);
     }
 }
 template <int W>
 NACRE_INLINE Floats<W> difference_y(Floats<W> v) {
     if constexpr (W == 4) {
-        return __builtin_shuffle(v, Ints<W>{2, 3, 2, 3}) - __builtin_shuffle(v, Ints<W>{0, 1, 0, 1});
+        return __builtin_shufflevector(v, v, 2, 3, 2, 3) - __builtin_shufflevector(v, v, 0, 1, 0, 1);
     } else if constexpr (W == 8) {
-        return __builtin_shuffle(v, Ints<W>{2, 3, 2, 3, 6, 7, 6, 7}) - __builtin_shuffle(v, Ints<W>{0, 1, 0, 1, 4, 5, 4, 5});
+        return __builtin_shufflevector(v, v, 2, 3, 2, 3, 6, 7, 6, 7) -
+               __builtin_shufflevector(v, v, 0, 1, 0, 1, 4, 5, 4, 5);
     } else {
-        return __builtin_shuffle(v, Ints<W>{2, 3, 2, 3, 6, 7, 6, 7, 10, 11, 10, 11, 14, 15, 14, 15}) -
-               __builtin_shuffle(v, Ints<W>{0, 1, 0, 1, 4, 5, 4, 5, 8, 9, 8, 9, 12, 13, 12, 13});
+        return __builtin_shufflevector(v, v, 2, 3, 2, 3, 6, 7, 6, 7, 10, 11, 10, 11, 14, 15, 14, 15) -
+               __builtin_shufflevector(v, v, 0, 1, 0, 1, 4, 5, 4, 5, 8, 9, 8, 9, 12, 13, 12, 13);
     }
 }
 
@@ -159,8 +165,8 @@ NACRE_INLINE Floats<W> halves_to_floats(Ints<W> half) {
     return (Floats<W>)(result | sign);
 }
 
-/// The other way, for floats of a 5-bit exponent and `mantissa_bits` (10, 6 or 5): magnitude only, rounded to nearest even.
-/// Overflow gives infinity, or the largest finite value where `saturates` (infinity stays infinity).
+/// The other way, for floats of a 5-bit exponent and `mantissa_bits` (10, 6 or 5): magnitude only, rounded to nearest
+/// even. Overflow gives infinity, or the largest finite value where `saturates` (infinity stays infinity).
 template <int W>
 NACRE_INLINE Ints<W> floats_to_small(Floats<W> value, std::int32_t mantissa_bits, bool saturates) {
     const Ints<W> bits = (Ints<W>)value & 0x7fffffff;
@@ -173,7 +179,8 @@ NACRE_INLINE Ints<W> floats_to_small(Floats<W> value, std::int32_t mantissa_bits
     const Floats<W> tiny = is_tiny ? (Floats<W>)bits * scale : splat<W>(0.0f);
     result = is_tiny ? truncate<W>(round_small<W>(tiny)) : result;
     result = bits >= 0x7f800000 ? splat<W>(infinity) : result;
-    const Ints<W> nan = splat<W>(infinity | (1 << (mantissa_bits - 1))) | ((bits >> dropped) & ((1 << mantissa_bits) - 1));
+    const Ints<W> nan =
+        splat<W>(infinity | (1 << (mantissa_bits - 1))) | ((bits >> dropped) & ((1 << mantissa_bits) - 1));
     return bits > 0x7f800000 ? nan : result;
 }
 

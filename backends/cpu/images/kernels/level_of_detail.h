@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which mips a sample reads. Source: Vulkan specification, "Scale Factor Operation", "LOD Operation", "Image Level(s) Selection".
+// Which mips a sample reads. Source: Vulkan specification, "Scale Factor Operation", "LOD Operation", "Image Level(s)
+// Selection".
 #pragma once
 
 #include "backends/cpu/images/kernels/cube.h"
@@ -11,7 +12,8 @@ template <int W>
 struct LevelOfDetail {
     Floats<W> unclamped;  ///< lambda' of the specification.
     Floats<W> lambda;     ///< Clamped by sampler and shader.
-    /// Anisotropic filtering: number of samples along the longer axis of the footprint (1: isotropic) and that axis in (s, t).
+    /// Anisotropic filtering: number of samples along the longer axis of the footprint (1: isotropic) and that axis in
+    /// (s, t).
     bool is_anisotropic = false;
     Floats<W> sample_count;
     Floats<W> axis[2];
@@ -20,8 +22,8 @@ struct LevelOfDetail {
 /// @param coordinates  as the shader gave them (for cubes, directions)
 /// @param cube         for cubes, else null
 template <int W>
-[[gnu::noinline]] void level_of_detail(const Invocation& call, const Floats<W>* coordinates, const CubeProjection<W>* cube, int spatial,
-                                       LevelOfDetail<W>& result) {
+[[gnu::noinline]] void level_of_detail(const Invocation& call, const Floats<W>* coordinates,
+                                       const CubeProjection<W>* cube, int spatial, LevelOfDetail<W>& result) {
     const rhi::SamplerDesc& sampler = call.sampler->desc;
     const ImageArguments& arguments = *call.arguments;
     const ImageLevel& base = *reinterpret_cast<const ImageLevel*>(&call.image->levels);
@@ -48,7 +50,8 @@ template <int W>
             dy[0] = projected[0], dy[1] = projected[1];
             axes = 2;
         }
-        const float size[3] = {static_cast<float>(base.width), static_cast<float>(base.height), static_cast<float>(base.depth)};
+        const float size[3] = {static_cast<float>(base.width), static_cast<float>(base.height),
+                               static_cast<float>(base.depth)};
         Floats<W> length_x = splat<W>(0.0f), length_y = splat<W>(0.0f);  // Squared, in texels.
         for (int axis = 0; axis < axes; ++axis) {
             const Floats<W> x = dx[axis] * size[axis], y = dy[axis] * size[axis];
@@ -60,7 +63,8 @@ template <int W>
         if (sampler.max_anisotropy > 1.0f && axes == 2 && cube == nullptr) {
             const Floats<W> shortest = minimum<W>(length_x, length_y), one = splat<W>(1.0f);
             const float limit = sampler.max_anisotropy < 16.0f ? sampler.max_anisotropy : 16.0f;
-            // The ratio of the axes. Where the footprint is a line it is as large as allowed, where it is a point it is 1.
+            // The ratio of the axes. Where the footprint is a line it is as large as allowed, where it is a point it
+            // is 1.
             Floats<W> ratio = square_root<W>(longest) / square_root<W>(shortest);
             ratio = clamp<W>(ratio, one, splat<W>(limit));
             result.sample_count = -floor_small<W>(0.00390625f - ratio);
@@ -82,7 +86,8 @@ template <int W>
 
 /// The first mip of each lane and the weight of the one behind it (0: that one is not read).
 template <int W>
-NACRE_INLINE void select_levels(Floats<W> lambda, std::uint32_t mip_count, bool is_mip_linear, Ints<W>& level, Floats<W>& weight) {
+NACRE_INLINE void select_levels(Floats<W> lambda, std::uint32_t mip_count, bool is_mip_linear, Ints<W>& level,
+                                Floats<W>& weight) {
     const Floats<W> last = splat<W>(static_cast<float>(mip_count - 1)), d = clamp<W>(lambda, splat<W>(0.0f), last);
     if (is_mip_linear) {
         const Floats<W> whole = floor_small<W>(d);

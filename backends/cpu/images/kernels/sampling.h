@@ -37,7 +37,8 @@ template <int W, Codec C>
 
 /// Texel of one tap, with the border in its place where it lies outside.
 template <int W>
-[[gnu::noinline]] void load_tap(const Source& source, const Taps<W>& taps, int tap, rhi::BorderColor border, Floats<W>* out) {
+[[gnu::noinline]] void load_tap(const Source& source, const Taps<W>& taps, int tap, rhi::BorderColor border,
+                                Floats<W>* out) {
     load_texels<W>(source, taps.places[tap], out);
     if (!taps.has_border) return;
     float rgb, alpha;
@@ -76,7 +77,7 @@ struct Sampling {
     bool is_cube;
     Floats<W> coordinates[3];  ///< Cubes: the direction.
     CubeProjection<W> cube;
-    Ints<W> slice;             ///< Layer; for cubes the slice of face 0.
+    Ints<W> slice;  ///< Layer; for cubes the slice of face 0.
     Ints<W> offsets[3];
     const Ints<W>* offset = nullptr;  ///< `offsets` where the call has some.
     Floats<W> reference;
@@ -90,7 +91,8 @@ NACRE_INLINE void prepare(const Invocation& call, Sampling<W>& sampling) {
     sampling.sampler = &call.sampler->desc;
     sampling.spatial = axes.spatial;
     sampling.is_cube = axes.is_cube;
-    for (int axis = 0; axis < axes.spatial; ++axis) sampling.coordinates[axis] = call.floats<W>(arguments.coordinates[axis]);
+    for (int axis = 0; axis < axes.spatial; ++axis)
+        sampling.coordinates[axis] = call.floats<W>(arguments.coordinates[axis]);
     sampling.slice = splat<W>(0);
     if (axes.has_layers) {
         const Floats<W> layer = call.floats<W>(arguments.coordinates[axes.spatial]);
@@ -111,8 +113,8 @@ NACRE_INLINE void prepare(const Invocation& call, Sampling<W>& sampling) {
 }
 
 template <int W>
-NACRE_INLINE void footprint(const Sampling<W>& sampling, const Source& source, const Floats<W>* coordinates, bool is_linear,
-                            const Ints<W>* offset, Taps<W>& taps) {
+NACRE_INLINE void footprint(const Sampling<W>& sampling, const Source& source, const Floats<W>* coordinates,
+                            bool is_linear, const Ints<W>* offset, Taps<W>& taps) {
     if (sampling.is_cube) return make_cube_taps<W>(source, sampling.cube, sampling.slice, is_linear, taps);
     const rhi::SamplerDesc& sampler = *sampling.sampler;
     make_taps<W>(source, coordinates, sampling.slice, sampling.spatial, is_linear,
@@ -121,8 +123,8 @@ NACRE_INLINE void footprint(const Sampling<W>& sampling, const Source& source, c
 
 /// One isotropic sample of one level.
 template <int W>
-[[gnu::noinline]] void sample_once(const Sampling<W>& sampling, const Source& source, const Floats<W>* coordinates, bool is_linear,
-                                   Floats<W>* out) {
+[[gnu::noinline]] void sample_once(const Sampling<W>& sampling, const Source& source, const Floats<W>* coordinates,
+                                   bool is_linear, Floats<W>* out) {
     Taps<W> taps;
     footprint<W>(sampling, source, coordinates, is_linear, sampling.offset, taps);
     const rhi::BorderColor border = sampling.sampler->border;
@@ -145,8 +147,8 @@ template <int W>
 
 /// One level with the filter's full footprint.
 template <int W>
-NACRE_INLINE void sample_level(const Sampling<W>& sampling, const LevelOfDetail<W>& detail, std::uint32_t level, bool is_linear,
-                               Floats<W>* out) {
+NACRE_INLINE void sample_level(const Sampling<W>& sampling, const LevelOfDetail<W>& detail, std::uint32_t level,
+                               bool is_linear, Floats<W>* out) {
     Source source;
     if (!make_source(*sampling.call->image, level, source)) {
         for (int c = 0; c < 4; ++c) out[c] = splat<W>(0.0f);
@@ -161,7 +163,8 @@ NACRE_INLINE void sample_level(const Sampling<W>& sampling, const LevelOfDetail<
         const Floats<W> along = static_cast<float>(i) / (detail.sample_count + 1.0f) - 0.5f;
         Floats<W> moved[3];
         for (int axis = 0; axis < 2; ++axis) {
-            moved[axis] = detail.sample_count > 1.0f ? sampling.coordinates[axis] + along * detail.axis[axis] : sampling.coordinates[axis];
+            moved[axis] = detail.sample_count > 1.0f ? sampling.coordinates[axis] + along * detail.axis[axis]
+                                                     : sampling.coordinates[axis];
         }
         Floats<W> once[4];
         sample_once<W>(sampling, source, moved, is_linear, once);
@@ -177,7 +180,8 @@ NACRE_INLINE bool can_sample(const Invocation& call) {
     const FormatPlan& plan = format_plan(image.format);
     const Axes axes = axes_of(image.dimension);
     if (axes.is_cube && image.layer_count < 6) return false;
-    return plan.codec != Codec::none && plan.is_integer == call.has(image_integer) && !(plan.is_integer && call.has(image_compare));
+    return plan.codec != Codec::none && plan.is_integer == call.has(image_integer) &&
+           !(plan.is_integer && call.has(image_compare));
 }
 
 template <int W>
@@ -195,9 +199,11 @@ template <int W>
     Ints<W> level = splat<W>(0), linear = magnifies_linearly ? ~splat<W>(0) : splat<W>(0);
     Floats<W> next_weight = splat<W>(0.0f);
     if (image.mip_count > 1 || magnifies_linearly != minifies_linearly || sampler.max_anisotropy > 1.0f) {
-        level_of_detail<W>(call, sampling.coordinates, sampling.is_cube ? &sampling.cube : nullptr, sampling.spatial, detail);
+        level_of_detail<W>(call, sampling.coordinates, sampling.is_cube ? &sampling.cube : nullptr, sampling.spatial,
+                           detail);
         if (is_integer) detail.is_anisotropic = false;
-        select_levels<W>(detail.lambda, image.mip_count, !is_integer && sampler.mip == rhi::Filter::linear, level, next_weight);
+        select_levels<W>(detail.lambda, image.mip_count, !is_integer && sampler.mip == rhi::Filter::linear, level,
+                         next_weight);
         if (magnifies_linearly != minifies_linearly) {
             const Ints<W> magnified = detail.lambda <= 0.0f;
             linear = magnifies_linearly ? magnified : ~magnified;
@@ -209,13 +215,15 @@ template <int W>
     const std::uint32_t next_bits = mask_bits<W>(has_next) & call.live;
     Floats<W> out[4];
     const std::int32_t first = level[first_bit(call.live)];
-    if ((mask_bits<W>(level == first) & call.live) == call.live && next_bits == 0 && (linear_bits == 0 || nearest_bits == 0)) {
+    if ((mask_bits<W>(level == first) & call.live) == call.live && next_bits == 0 &&
+        (linear_bits == 0 || nearest_bits == 0)) {
         // All lanes read one level in the same way.
         sample_level<W>(sampling, detail, static_cast<std::uint32_t>(first), linear_bits != 0, out);
         return write_result<W>(call, out, mask_of_bits<W>(call.live));
     }
     for (int c = 0; c < 4; ++c) out[c] = splat<W>(0.0f);
-    // Every level once for all lanes that read it, from the finest on, so that a lane's sum does not depend on its neighbors.
+    // Every level once for all lanes that read it, from the finest on, so that a lane's sum does not depend on its
+    // neighbors.
     std::uint32_t pending = call.live, pending_next = next_bits;
     for (std::int32_t m = 0; (pending | pending_next) != 0; ++m) {
         const Ints<W> is_first = level == m, is_next = (level == m - 1) & has_next;
@@ -259,7 +267,8 @@ template <int W>
     Taps<W> taps;
     if (call.has(image_offsets) && !sampling.is_cube) {
         for (int i = 0; i < 4; ++i) {
-            for (int axis = 0; axis < 2; ++axis) sampling.offsets[axis] = splat<W>(call.arguments->gather_offsets[i][axis]);
+            for (int axis = 0; axis < 2; ++axis)
+                sampling.offsets[axis] = splat<W>(call.arguments->gather_offsets[i][axis]);
             sampling.offsets[2] = splat<W>(0);
             footprint<W>(sampling, source, sampling.coordinates, true, sampling.offsets, taps);
             out[i] = value_of(taps, 0);
@@ -290,10 +299,12 @@ template <int W>
     Sampling<W> sampling;
     prepare<W>(call, sampling);
     LevelOfDetail<W> detail;
-    level_of_detail<W>(call, sampling.coordinates, sampling.is_cube ? &sampling.cube : nullptr, sampling.spatial, detail);
+    level_of_detail<W>(call, sampling.coordinates, sampling.is_cube ? &sampling.cube : nullptr, sampling.spatial,
+                       detail);
     Ints<W> level;
     Floats<W> weight;
-    select_levels<W>(detail.lambda, call.image->mip_count, call.sampler->desc.mip == rhi::Filter::linear, level, weight);
+    select_levels<W>(detail.lambda, call.image->mip_count, call.sampler->desc.mip == rhi::Filter::linear, level,
+                     weight);
     const Floats<W> out[4] = {to_floats<W>(level) + weight, detail.unclamped, splat<W>(0.0f), splat<W>(0.0f)};
     write_result<W>(call, out, mask_of_bits<W>(call.live));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The few things that GCC's vector types cannot say: gathers, masks as bits, square roots. Every one has a form without intrinsics
-// that gives the same bits, which other machines use.
+// The few things that GCC's vector types cannot say: gathers, masks as bits, square roots. Every one has a form without
+// intrinsics that gives the same bits, which other machines use.
 #pragma once
 
 #include <cstddef>
@@ -34,10 +34,12 @@ template <int W>
 NACRE_INLINE Ints<W> gather_words(const std::byte* base, Ints<W> offset) {
 #ifdef __AVX512F__
     // With a mask, for GCC 12 warns about its own header in the form without.
-    if constexpr (W == 16) return (Ints<W>)_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), 0xffff, (__m512i)offset, base, 1);
+    if constexpr (W == 16)
+        return (Ints<W>)_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), 0xffff, (__m512i)offset, base, 1);
 #endif
 #ifdef __AVX2__
-    if constexpr (W == 8) return (Ints<W>)_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), (__m256i)offset, 1);
+    if constexpr (W == 8)
+        return (Ints<W>)_mm256_i32gather_epi32(reinterpret_cast<const int*>(base), (__m256i)offset, 1);
     if constexpr (W == 4) return (Ints<W>)_mm_i32gather_epi32(reinterpret_cast<const int*>(base), (__m128i)offset, 1);
 #endif
     Ints<W> words;
@@ -47,6 +49,27 @@ NACRE_INLINE Ints<W> gather_words(const std::byte* base, Ints<W> offset) {
         words[lane] = word;
     }
     return words;
+}
+
+/// Texels of 1 or 2 bytes at base + offset[lane], in the low bits; what is above does not matter. Gathers read aligned
+/// words, so that nothing behind the last texel's own word is touched.
+template <int W>
+NACRE_INLINE Ints<W> gather_small_texels(const std::byte* base, Ints<W> offset, int bytes) {
+#ifdef __AVX2__
+    static_cast<void>(bytes);
+    const auto address = reinterpret_cast<std::uintptr_t>(base);
+    const Ints<W> moved = offset + static_cast<std::int32_t>(address & 3);
+    const Ints<W> word = gather_words<W>(reinterpret_cast<const std::byte*>(address & ~std::uintptr_t{3}), moved & ~3);
+    return (Ints<W>)((Uints<W>)word >> (Uints<W>)((moved & 3) << 3));
+#else
+    Ints<W> texels;
+    for (int lane = 0; lane < W; ++lane) {
+        std::uint32_t texel = static_cast<std::uint8_t>(base[offset[lane]]);
+        if (bytes == 2) texel |= static_cast<std::uint32_t>(base[offset[lane] + 1]) << 8;
+        texels[lane] = static_cast<std::int32_t>(texel);
+    }
+    return texels;
+#endif
 }
 
 /// One bit for each lane of a mask.

@@ -164,8 +164,10 @@ template <int W>
             }
         } else {
             const std::int32_t word = words[0][lane];
-            if (plan.texel_bytes == 2) __builtin_memcpy(to, &word, 2);
-            else __builtin_memcpy(to, &word, 1);
+            if (plan.texel_bytes == 2)
+                __builtin_memcpy(to, &word, 2);
+            else
+                __builtin_memcpy(to, &word, 1);
         }
     }
 }

@@ -19,13 +19,13 @@ struct Source {
     std::byte* base;
     std::int32_t width, height, depth;
     std::int32_t row_stride;
-    std::uint64_t slice_stride;   ///< Between layers, or slices of a 3D image.
+    std::uint64_t slice_stride;  ///< Between layers, or slices of a 3D image.
     std::uint64_t sample_stride;
     [[nodiscard]] NACRE_INLINE bool uses_offsets() const { return codec <= Codec::shared_exponent; }
 };
 
-/// Where one texel of each lane lies. Either `offset` counts, or the other three (see Source::uses_offsets). Always inside of the
-/// level, also in lanes that are not live.
+/// Where one texel of each lane lies. Either `offset` counts, or the other three (see Source::uses_offsets). Always
+/// inside of the level, also in lanes that are not live.
 template <int W>
 struct Place {
     Ints<W> offset;
@@ -75,11 +75,7 @@ NACRE_INLINE Place<W> place_texel(const Source& source, Ints<W> x, Ints<W> y, In
 template <int W>
 NACRE_INLINE Ints<W> load_word(const Source& source, Ints<W> offset) {
     if (source.plan->texel_bytes >= 4) return gather_words<W>(source.base, offset);
-    // Aligned words, so that nothing behind the last texel's own word is touched.
-    const auto address = reinterpret_cast<std::uintptr_t>(source.base);
-    const Ints<W> moved = offset + static_cast<std::int32_t>(address & 3);
-    const Ints<W> word = gather_words<W>(reinterpret_cast<const std::byte*>(address & ~std::uintptr_t{3}), moved & ~3);
-    return (Ints<W>)((Uints<W>)word >> (Uints<W>)((moved & 3) << 3));
+    return gather_small_texels<W>(source.base, offset, source.plan->texel_bytes);
 }
 
 template <int W>
@@ -98,7 +94,8 @@ NACRE_INLINE Floats<W> decode_channel(const ChannelPlan& channel, Ints<W> word) 
     switch (channel.coding) {
         case ChannelCoding::unorm: return to_floats<W>(field<W>(word, channel.shift, channel.bits));
         case ChannelCoding::snorm:
-            return maximum<W>(to_floats<W>(signed_field<W>(word, channel.shift, channel.bits)), splat<W>(-channel.most));
+            return maximum<W>(to_floats<W>(signed_field<W>(word, channel.shift, channel.bits)),
+                              splat<W>(-channel.most));
         case ChannelCoding::sint: return (Floats<W>)signed_field<W>(word, channel.shift, channel.bits);
         case ChannelCoding::half: return halves_to_floats<W>(field<W>(word, channel.shift, 16));
         case ChannelCoding::small_float:
@@ -122,29 +119,39 @@ NACRE_INLINE const std::byte* block_address(const Source& source, const Place<W>
 template <int W>
 [[gnu::noinline]] void load_block_words(const Source& source, const Place<W>& place, Ints<W>& words) {
     BlockCache& cache = BlockCache::of_this_thread();
+    const std::byte* last = nullptr;
+    const DecodedBlock* block = nullptr;
     for (int lane = 0; lane < W; ++lane) {
-        const DecodedBlock& block = cache.find(source.format, block_address<W>(source, place, lane));
-        words[lane] = static_cast<std::int32_t>(block.rgba8[(place.y[lane] & 3) * 4 + (place.x[lane] & 3)]);
+        // Neighboring lanes mostly read the same block.
+        const std::byte* const address = block_address<W>(source, place, lane);
+        if (address != last) block = &cache.find(source.format, address, source.plan->texel_bytes);
+        last = address;
+        words[lane] = static_cast<std::int32_t>(block->rgba8[(place.y[lane] & 3) * 4 + (place.x[lane] & 3)]);
     }
 }
 template <int W>
 [[gnu::noinline]] void load_block_channels(const Source& source, const Place<W>& place, Floats<W>* channels) {
     BlockCache& cache = BlockCache::of_this_thread();
     const bool is_half = source.plan->channel_count == 3;
+    const std::byte* last = nullptr;
+    const DecodedBlock* block = nullptr;
     for (int lane = 0; lane < W; ++lane) {
-        const DecodedBlock& block = cache.find(source.format, block_address<W>(source, place, lane));
+        const std::byte* const address = block_address<W>(source, place, lane);
+        if (address != last) block = &cache.find(source.format, address, source.plan->texel_bytes);
+        last = address;
         const int texel = (place.y[lane] & 3) * 4 + (place.x[lane] & 3);
         for (int c = 0; c < source.plan->channel_count; ++c) {
-            channels[c][lane] = is_half ? half_to_float(block.halves[texel][c]) : block.channels[c][texel];
+            channels[c][lane] = is_half ? half_to_float(block->halves[texel][c]) : block->channels[c][texel];
         }
     }
 }
 template <int W>
 [[gnu::noinline]] void load_far_texels(const Source& source, const Place<W>& place, Floats<W>* channels) {
     for (int lane = 0; lane < W; ++lane) {
-        const std::byte* at = source.base + static_cast<std::uint64_t>(place.slice[lane]) * source.slice_stride +
-                              static_cast<std::uint64_t>(place.y[lane]) * static_cast<std::uint64_t>(source.row_stride) +
-                              static_cast<std::uint64_t>(place.x[lane]) * source.plan->texel_bytes;
+        const std::byte* at =
+            source.base + static_cast<std::uint64_t>(place.slice[lane]) * source.slice_stride +
+            static_cast<std::uint64_t>(place.y[lane]) * static_cast<std::uint64_t>(source.row_stride) +
+            static_cast<std::uint64_t>(place.x[lane]) * source.plan->texel_bytes;
         const Texel texel = decode_texel(source.format, at);
         for (int c = 0; c < 4; ++c) channels[c][lane] = texel.f[c];
     }
@@ -153,10 +160,14 @@ template <int W>
 /// Channels that `load_raw` sets.
 template <Codec C>
 NACRE_INLINE int raw_channels(const FormatPlan& plan) {
-    if constexpr (C == Codec::word) return 1;
-    else if constexpr (C == Codec::general || C == Codec::block_channels) return plan.channel_count;
-    else if constexpr (C == Codec::shared_exponent) return 3;
-    else return 4;
+    if constexpr (C == Codec::word)
+        return 1;
+    else if constexpr (C == Codec::general || C == Codec::block_channels)
+        return plan.channel_count;
+    else if constexpr (C == Codec::shared_exponent)
+        return 3;
+    else
+        return 4;
 }
 
 /// Channels that are `raw_scale` times too large.
@@ -191,7 +202,8 @@ NACRE_INLINE void load_raw(const Source& source, const Place<W>& place, Floats<W
         Ints<W> words[4];
         words[0] = load_word<W>(source, place.offset);
         for (int i = 1; i < plan.words; ++i) words[i] = gather_words<W>(source.base, place.offset + 4 * i);
-        for (int c = 0; c < plan.channel_count; ++c) out[c] = decode_channel<W>(plan.channels[c], words[plan.channels[c].word]);
+        for (int c = 0; c < plan.channel_count; ++c)
+            out[c] = decode_channel<W>(plan.channels[c], words[plan.channels[c].word]);
     } else if constexpr (C == Codec::shared_exponent) {
         const Ints<W> word = gather_words<W>(source.base, place.offset);
         // 2^(exponent - 24) as bits; the exponent is 0 to 31.
@@ -206,13 +218,18 @@ NACRE_INLINE void load_raw(const Source& source, const Place<W>& place, Floats<W
 
 template <Codec C>
 NACRE_INLINE float raw_scale(const FormatPlan& plan, int c) {
-    if constexpr (C == Codec::rgba8 || C == Codec::block_rgba8) return 255.0f;
-    else if constexpr (C == Codec::srgb8 || C == Codec::block_srgb8) return c == 3 ? 255.0f : 1.0f;
-    else if constexpr (C == Codec::general) return plan.channels[c].most;
-    else return 1.0f;
+    if constexpr (C == Codec::rgba8 || C == Codec::block_rgba8)
+        return 255.0f;
+    else if constexpr (C == Codec::srgb8 || C == Codec::block_srgb8)
+        return c == 3 ? 255.0f : 1.0f;
+    else if constexpr (C == Codec::general)
+        return plan.channels[c].most;
+    else
+        return 1.0f;
 }
 
-/// Divides by the scale and adds the channels that the format lacks. Values of texels come out as `decode_texel` gives them.
+/// Divides by the scale and adds the channels that the format lacks. Values of texels come out as `decode_texel` gives
+/// them.
 template <int W, Codec C>
 NACRE_INLINE void finish_raw(const FormatPlan& plan, Floats<W>* channels) {
     const int count = raw_channels<C>(plan);

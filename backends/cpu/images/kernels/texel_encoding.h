@@ -10,7 +10,8 @@ namespace {
 /// Rounds x * most to nearest even as if the product were exact; most = 2^bits - 1, 0 <= |x| <= 1, bits <= 16.
 template <int W>
 NACRE_INLINE Ints<W> scale_and_round(Floats<W> x, std::uint32_t bits) {
-    // x * 2^bits is exact, so the error of the product is that of one subtraction, which is known exactly. It decides ties.
+    // x * 2^bits is exact, so the error of the product is that of one subtraction, which is known exactly. It decides
+    // ties.
     const Floats<W> scaled = x * static_cast<float>(1u << bits);
     const Floats<W> product = scaled - x, error = (scaled - product) - x;
     const Floats<W> rounded = round_small<W>(product), rest = product - rounded;
@@ -29,7 +30,8 @@ NACRE_INLINE Ints<W> encode_channel(const ChannelPlan& channel, Ints<W> value) {
             const Floats<W> known = x == x ? x : splat<W>(0.0f);
             return scale_and_round<W>(clamp<W>(known, splat<W>(-1.0f), splat<W>(1.0f)), channel.bits - 1u);
         }
-        case ChannelCoding::half: return floats_to_small<W>(x, 10, false) | (Ints<W>)(((Uints<W>)value >> 16) & 0x8000u);
+        case ChannelCoding::half:
+            return floats_to_small<W>(x, 10, false) | (Ints<W>)(((Uints<W>)value >> 16) & 0x8000u);
         case ChannelCoding::small_float: {
             const Ints<W> code = floats_to_small<W>(x, channel.bits - 5, true);
             return x <= 0.0f ? splat<W>(0) : code;

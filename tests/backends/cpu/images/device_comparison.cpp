@@ -38,8 +38,10 @@ Oracle::Oracle() {
     backends.push_back(vulkan::make_backend());
     instance_ = std::make_unique<rhi::Instance>(std::move(backends));
     auto made = instance_->create_device({.backend = "vulkan"});
-    if (made) device_ = std::move(*made);
-    else reason_ = made.error().message();
+    if (made)
+        device_ = std::move(*made);
+    else
+        reason_ = made.error().message();
 }
 Oracle::~Oracle() = default;
 
@@ -60,8 +62,8 @@ std::string sampler_type(rhi::Format format, rhi::ViewDimension dimension, bool 
     return name + (is_comparison ? "Shadow" : "");
 }
 
-std::vector<Result> Oracle::evaluate(const TestImage& image, const rhi::SamplerDesc& sampler_desc, const std::string& expression,
-                                     std::span<const Point> points) {
+std::vector<Result> Oracle::evaluate(const TestImage& image, const rhi::SamplerDesc& sampler_desc,
+                                     const std::string& expression, std::span<const Point> points) {
     const ImageShape& shape = image.shape;
     rhi::TextureDesc desc{.format = shape.format,
                           .width = shape.width,
@@ -73,14 +75,17 @@ std::vector<Result> Oracle::evaluate(const TestImage& image, const rhi::SamplerD
                           .name = "oracle"};
     using enum rhi::ViewDimension;
     switch (shape.dimension) {
-        case d1: case d1_array: desc.dimension = rhi::TextureDimension::d1; break;
+        case d1:
+        case d1_array: desc.dimension = rhi::TextureDimension::d1; break;
         case d3: desc.dimension = rhi::TextureDimension::d3; break;
-        case cube: case cube_array: desc.dimension = rhi::TextureDimension::cube; break;
+        case cube:
+        case cube_array: desc.dimension = rhi::TextureDimension::cube; break;
         default: desc.dimension = rhi::TextureDimension::d2; break;
     }
     const rhi::Texture texture = must(device_->create_texture(desc));
     for (std::uint32_t mip = 0; mip < shape.mips; ++mip) {
-        for (std::uint32_t layer = 0; layer < shape.layers; ++layer) must(device_->write_texture(texture, image.layer(mip, layer), mip, layer));
+        for (std::uint32_t layer = 0; layer < shape.layers; ++layer)
+            must(device_->write_texture(texture, image.layer(mip, layer), mip, layer));
     }
     rhi::TextureView view(texture);
     view.dimension = shape.dimension;
@@ -102,13 +107,12 @@ std::vector<Result> Oracle::evaluate(const TestImage& image, const rhi::SamplerD
     must(device_->write_buffer(in, std::span<const DevicePoint>(input)));
     const rhi::Buffer out = must(device_->create_buffer({.size = points.size() * 16, .usage = storage}));
 
-    const rhi::FormatKind kind = rhi::info(shape.format).kind;
     const bool is_integer = rhi::info(shape.format).is_integer();
     const std::string to_bits = !is_integer ? "floatBitsToUint(vec4(" + expression + "))" : "uvec4(" + expression + ")";
-    static_cast<void>(kind);
     const std::string text = R"(
 layout(local_size_x = 64) in;
-layout(set = 0, binding = 0) uniform )" + sampler_type(shape.format, shape.dimension, sampler_desc.comparison) + R"( image;
+layout(set = 0, binding = 0) uniform )" +
+                             sampler_type(shape.format, shape.dimension, sampler_desc.comparison) + R"( image;
 struct Point { uvec4 coordinates; vec4 lod; vec4 gx; vec4 gy; ivec4 offset; };
 layout(set = 0, binding = 1, std430) readonly buffer Input { Point points[]; };
 layout(set = 0, binding = 2, std430) buffer Output { uvec4 results[]; };
@@ -120,7 +124,8 @@ void main() {
     float lod = points[i].lod.x, reference = points[i].lod.y;
     vec3 gx = points[i].gx.xyz, gy = points[i].gy.xyz;
     ivec3 offset = points[i].offset.xyz;
-    results[i] = )" + to_bits + R"(;
+    results[i] = )" + to_bits +
+                             R"(;
 })";
     rhi::ShaderCompiler compiler({});
     auto shader = compiler.compile({.path = "oracle.comp", .text = text});
@@ -130,9 +135,11 @@ void main() {
     }
     const rhi::Shader shader_handle = must(device_->create_shader(*shader));
     const rhi::ComputePipeline pipeline = must(device_->create_compute_pipeline({.shader = shader_handle}));
-    const rhi::BindGroup group = must(device_->create_bind_group(
-        {.layout = must(device_->bind_group_layout(pipeline, 0)),
-         .entries = {{.binding = 0, .texture = view, .sampler = sampler}, {.binding = 1, .buffer = in}, {.binding = 2, .buffer = out}}}));
+    const rhi::BindGroup group =
+        must(device_->create_bind_group({.layout = must(device_->bind_group_layout(pipeline, 0)),
+                                         .entries = {{.binding = 0, .texture = view, .sampler = sampler},
+                                                     {.binding = 1, .buffer = in},
+                                                     {.binding = 2, .buffer = out}}}));
     rhi::CommandList list = device_->create_command_list("oracle");
     list.set_pipeline(pipeline);
     list.set_bind_group(0, group);

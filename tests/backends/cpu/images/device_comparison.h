@@ -22,9 +22,9 @@ class Oracle {
     [[nodiscard]] rhi::Device* device() const { return device_.get(); }
     [[nodiscard]] const std::string& reason() const { return reason_; }
 
-    /// Evaluates a GLSL expression of type vec4, ivec4 or uvec4 for all points. The expression sees `image` (of the fitting sampler
-    /// type), and of each point `p` (vec4 of coordinates), `ip` (the same bits as ivec4), `lod`, `reference`, `gx`, `gy` (vec3),
-    /// `offset` (ivec3).
+    /// Evaluates a GLSL expression of type vec4, ivec4 or uvec4 for all points. The expression sees `image` (of the
+    /// fitting sampler type), and of each point `p` (vec4 of coordinates), `ip` (the same bits as ivec4), `lod`,
+    /// `reference`, `gx`, `gy` (vec3), `offset` (ivec3).
     std::vector<Result> evaluate(const TestImage& image, const rhi::SamplerDesc& sampler, const std::string& expression,
                                  std::span<const Point> points);
 
@@ -35,6 +35,7 @@ class Oracle {
 };
 
 /// GLSL name of a sampler type, e.g. "isamplerCubeArray".
-std::string sampler_type(rhi::Format format, rhi::ViewDimension dimension, bool is_comparison, bool is_multisampled = false);
+std::string sampler_type(rhi::Format format, rhi::ViewDimension dimension, bool is_comparison,
+                         bool is_multisampled = false);
 
 }  // namespace nacre::cpu::test

@@ -15,14 +15,20 @@ using rhi::ViewDimension;
 int axes_of(ViewDimension dimension) {
     using enum ViewDimension;
     switch (dimension) {
-        case d1: case d1_array: return 1;
-        case d2: case d2_array: return 2;
+        case d1:
+        case d1_array: return 1;
+        case d2:
+        case d2_array: return 2;
         default: return 3;
     }
 }
-bool is_cube(ViewDimension dimension) { return dimension == ViewDimension::cube || dimension == ViewDimension::cube_array; }
+bool is_cube(ViewDimension dimension) {
+    return dimension == ViewDimension::cube || dimension == ViewDimension::cube_array;
+}
 
-double coordinate(const Point& point, int axis) { return std::bit_cast<float>(point.coordinates[static_cast<std::size_t>(axis)]); }
+double coordinate(const Point& point, int axis) {
+    return std::bit_cast<float>(point.coordinates[static_cast<std::size_t>(axis)]);
+}
 
 // Wrapping operation; -1 or n stand for the border.
 int wrapped(int i, int n, AddressMode mode) {
@@ -51,8 +57,8 @@ bool passes(rhi::CompareOperation operation, double reference, double depth) {
     }
 }
 
-// The point of the cube's surface (or of the plane of a face beyond its edges) at s, t in [-1, 1] of a face: the table of the
-// specification read backwards.
+// The point of the cube's surface (or of the plane of a face beyond its edges) at s, t in [-1, 1] of a face: the table
+// of the specification read backwards.
 std::array<double, 3> cube_point(int face, double s, double t) {
     switch (face) {
         case 0: return {1, -t, -s};
@@ -93,7 +99,8 @@ ReferenceSampler::FaceCoordinates ReferenceSampler::project(const Vector& r) {
     return result;
 }
 
-ReferenceSampler::Detail ReferenceSampler::detail(std::uint32_t flags, std::span<const Point, 4> quad, std::size_t index) {
+ReferenceSampler::Detail ReferenceSampler::detail(std::uint32_t flags, std::span<const Point, 4> quad,
+                                                  std::size_t index) {
     Detail result;
     const Point& point = quad[index];
     const ViewDimension dimension = image_.shape.dimension;
@@ -123,7 +130,8 @@ ReferenceSampler::Detail ReferenceSampler::detail(std::uint32_t flags, std::span
                     Vector moved;
                     for (int i = 0; i < 3; ++i) moved[i] = r[i] + (side == 0 ? -step : step) * d[i];
                     // On the plane of the same face.
-                    const Vector normal = cube_point(here.face, 0, 0), s_axis = cube_point(here.face, 1, 0), t_axis = cube_point(here.face, 0, 1);
+                    const Vector normal = cube_point(here.face, 0, 0), s_axis = cube_point(here.face, 1, 0),
+                                 t_axis = cube_point(here.face, 0, 1);
                     double n = 0, s = 0, t = 0;
                     for (int i = 0; i < 3; ++i) {
                         n += normal[i] * moved[i];
@@ -138,7 +146,8 @@ ReferenceSampler::Detail ReferenceSampler::detail(std::uint32_t flags, std::span
             texel_axes = 2;
         }
         const ImageLevel& base = image_.view.levels[0];
-        const double size[3] = {static_cast<double>(base.width), static_cast<double>(base.height), static_cast<double>(base.depth)};
+        const double size[3] = {static_cast<double>(base.width), static_cast<double>(base.height),
+                                static_cast<double>(base.depth)};
         double length_x = 0.0, length_y = 0.0;
         for (int axis = 0; axis < texel_axes; ++axis) {
             length_x += std::pow(dx[axis] * size[axis], 2);
@@ -166,18 +175,22 @@ ReferenceSampler::Detail ReferenceSampler::detail(std::uint32_t flags, std::span
     return result;
 }
 
-std::array<double, 4> ReferenceSampler::texel(std::uint32_t flags, const Point& point, int mip, int layer, std::array<int, 3> at) {
+std::array<double, 4> ReferenceSampler::texel(std::uint32_t flags, const Point& point, int mip, int layer,
+                                              std::array<int, 3> at) {
     const ImageLevel& level = image_.view.levels[static_cast<std::size_t>(mip)];
     const rhi::FormatInfo& facts = rhi::info(image_.shape.format);
     const bool is_inside = at[0] >= 0 && at[1] >= 0 && at[2] >= 0 && at[0] < static_cast<int>(level.width) &&
                            at[1] < static_cast<int>(level.height) && at[2] < static_cast<int>(level.depth);
     std::array<double, 4> value{0, 0, 0, 1};
     if (is_inside) {
-        const auto x = static_cast<std::uint64_t>(at[0]), y = static_cast<std::uint64_t>(at[1]), z = static_cast<std::uint64_t>(at[2]);
+        const auto x = static_cast<std::uint64_t>(at[0]), y = static_cast<std::uint64_t>(at[1]),
+                   z = static_cast<std::uint64_t>(at[2]);
         const std::uint64_t block = facts.block_width;
-        const std::byte* address = level.data + static_cast<std::uint64_t>(layer) * level.layer_stride + z * level.slice_stride +
-                                   y / block * level.row_stride + x / block * image_.view.texel_bytes;
-        const Texel decoded = decode_texel(image_.shape.format, address, static_cast<std::uint32_t>(x % block), static_cast<std::uint32_t>(y % block));
+        const std::byte* address = level.data + static_cast<std::uint64_t>(layer) * level.layer_stride +
+                                   z * level.slice_stride + y / block * level.row_stride +
+                                   x / block * image_.view.texel_bytes;
+        const Texel decoded = decode_texel(image_.shape.format, address, static_cast<std::uint32_t>(x % block),
+                                           static_cast<std::uint32_t>(y % block));
         for (int c = 0; c < 4; ++c) {
             value[c] = decoded.f[c];
             if (facts.kind == rhi::FormatKind::uint) value[c] = decoded.u[c];
@@ -186,7 +199,8 @@ std::array<double, 4> ReferenceSampler::texel(std::uint32_t flags, const Point& 
     } else {
         const int channels = facts.is_depth_stencil() ? 1 : facts.channels;
         for (int c = 0; c < channels; ++c) {
-            value[c] = c == 3 ? (sampler_.border != rhi::BorderColor::transparent_black) : (sampler_.border == rhi::BorderColor::opaque_white);
+            value[c] = c == 3 ? (sampler_.border != rhi::BorderColor::transparent_black)
+                              : (sampler_.border == rhi::BorderColor::opaque_white);
         }
     }
     if ((flags & image_compare) != 0) {
@@ -198,8 +212,8 @@ std::array<double, 4> ReferenceSampler::texel(std::uint32_t flags, const Point& 
     return value;
 }
 
-std::array<double, 4> ReferenceSampler::cube_texel(std::uint32_t flags, const Point& point, int mip, int first_layer, int face, int i, int j,
-                                                   bool& exists) {
+std::array<double, 4> ReferenceSampler::cube_texel(std::uint32_t flags, const Point& point, int mip, int first_layer,
+                                                   int face, int i, int j, bool& exists) {
     const int n = static_cast<int>(image_.view.levels[static_cast<std::size_t>(mip)].width);
     const bool outside_i = i < 0 || i >= n, outside_j = j < 0 || j >= n;
     exists = !(outside_i && outside_j);
@@ -222,16 +236,19 @@ std::array<double, 4> ReferenceSampler::cube_texel(std::uint32_t flags, const Po
     return texel(flags, point, mip, first_layer + face, {i, j, 0});
 }
 
-std::array<double, 4> ReferenceSampler::once(std::uint32_t flags, const Point& point, const Vector& at, int mip, bool is_linear) {
+std::array<double, 4> ReferenceSampler::once(std::uint32_t flags, const Point& point, const Vector& at, int mip,
+                                             bool is_linear) {
     const ViewDimension dimension = image_.shape.dimension;
     const ImageLevel& level = image_.view.levels[static_cast<std::size_t>(mip)];
     const int axes = axes_of(dimension);
     int layer = 0;
-    if (dimension == ViewDimension::d1_array || dimension == ViewDimension::d2_array || dimension == ViewDimension::cube_array) {
+    if (dimension == ViewDimension::d1_array || dimension == ViewDimension::d2_array ||
+        dimension == ViewDimension::cube_array) {
         const double wanted = coordinate(point, axes);
         const int count = static_cast<int>(image_.shape.layers) / (is_cube(dimension) ? 6 : 1);
         if (std::abs(wanted - std::floor(wanted) - 0.5) < 1e-4) is_ambiguous_ = true;
-        layer = std::clamp(static_cast<int>(std::nearbyint(std::clamp(wanted, -1e6, 1e6))), 0, count - 1) * (is_cube(dimension) ? 6 : 1);
+        layer = std::clamp(static_cast<int>(std::nearbyint(std::clamp(wanted, -1e6, 1e6))), 0, count - 1) *
+                (is_cube(dimension) ? 6 : 1);
     }
     std::array<double, 4> sum{};
     if (is_cube(dimension)) {
@@ -289,13 +306,15 @@ std::array<double, 4> ReferenceSampler::once(std::uint32_t flags, const Point& p
     return sum;
 }
 
-std::array<double, 4> ReferenceSampler::level(std::uint32_t flags, const Point& point, const Detail& found, int mip, bool is_linear) {
+std::array<double, 4> ReferenceSampler::level(std::uint32_t flags, const Point& point, const Detail& found, int mip,
+                                              bool is_linear) {
     const Vector at{coordinate(point, 0), coordinate(point, 1), coordinate(point, 2)};
     if (found.samples == 1) return once(flags, point, at, mip, is_linear);
     std::array<double, 4> sum{};
     for (int i = 1; i <= found.samples; ++i) {
         const double along = static_cast<double>(i) / (found.samples + 1) - 0.5;
-        const auto value = once(flags, point, {at[0] + along * found.axis[0], at[1] + along * found.axis[1], 0.0}, mip, is_linear);
+        const auto value =
+            once(flags, point, {at[0] + along * found.axis[0], at[1] + along * found.axis[1], 0.0}, mip, is_linear);
         for (int c = 0; c < 4; ++c) sum[c] += value[c] / found.samples;
     }
     return sum;
@@ -307,7 +326,8 @@ ReferenceResult ReferenceSampler::sample(std::uint32_t flags, std::span<const Po
     const Detail found = detail(flags, quad, index);
     const bool is_integer = rhi::info(image_.shape.format).is_integer();
     if (sampler_.magnify != sampler_.minify && std::abs(found.unclamped) < 1e-4) is_ambiguous_ = true;
-    const bool is_linear = !is_integer && (found.lambda <= 0.0 ? sampler_.magnify : sampler_.minify) == rhi::Filter::linear;
+    const bool is_linear =
+        !is_integer && (found.lambda <= 0.0 ? sampler_.magnify : sampler_.minify) == rhi::Filter::linear;
     const double last = image_.shape.mips - 1.0, d = std::clamp(found.lambda, 0.0, last);
     ReferenceResult result;
     if (is_integer || sampler_.mip == rhi::Filter::nearest) {

@@ -7,8 +7,9 @@
 #include "tests/backends/cpu/images/test_image.h"
 
 /// @file
-/// Texture sampling written down a second time, one point after the other in double precision, as the Vulkan specification has it
-/// (chapter "Image Operations"). Nothing is shared with the code under test but the decoding of texels, which has its own tests.
+/// Texture sampling written down a second time, one point after the other in double precision, as the Vulkan
+/// specification has it (chapter "Image Operations"). Nothing is shared with the code under test but the decoding of
+/// texels, which has its own tests.
 
 namespace nacre::cpu::test {
 
@@ -43,8 +44,8 @@ class ReferenceSampler {
     std::array<double, 4> level(std::uint32_t flags, const Point& point, const Detail& detail, int mip, bool is_linear);
     std::array<double, 4> once(std::uint32_t flags, const Point& point, const Vector& at, int mip, bool is_linear);
     std::array<double, 4> texel(std::uint32_t flags, const Point& point, int mip, int layer, std::array<int, 3> at);
-    std::array<double, 4> cube_texel(std::uint32_t flags, const Point& point, int mip, int first_layer, int face, int i, int j,
-                                     bool& exists);
+    std::array<double, 4> cube_texel(std::uint32_t flags, const Point& point, int mip, int first_layer, int face, int i,
+                                     int j, bool& exists);
     /// floor, and a mark where the value is close to a whole number.
     int decide(double value);
 

@@ -19,14 +19,21 @@ struct Shape {
     std::uint32_t width, height, depth, layers;
 };
 constexpr Shape shapes[] = {
-    {"d1", ViewDimension::d1, 37, 1, 1, 1},         {"d1_array", ViewDimension::d1_array, 33, 1, 1, 5},
-    {"d2", ViewDimension::d2, 64, 48, 1, 1},        {"d2_odd", ViewDimension::d2, 37, 23, 1, 1},
-    {"d2_array", ViewDimension::d2_array, 20, 31, 1, 4}, {"d3", ViewDimension::d3, 13, 9, 7, 1},
-    {"cube", ViewDimension::cube, 16, 16, 1, 6},    {"cube_array", ViewDimension::cube_array, 9, 9, 1, 12},
-    {"single_texel", ViewDimension::d2, 1, 1, 1, 1}, {"single_texel_cube", ViewDimension::cube, 1, 1, 1, 6},
+    {"d1", ViewDimension::d1, 37, 1, 1, 1},
+    {"d1_array", ViewDimension::d1_array, 33, 1, 1, 5},
+    {"d2", ViewDimension::d2, 64, 48, 1, 1},
+    {"d2_odd", ViewDimension::d2, 37, 23, 1, 1},
+    {"d2_array", ViewDimension::d2_array, 20, 31, 1, 4},
+    {"d3", ViewDimension::d3, 13, 9, 7, 1},
+    {"cube", ViewDimension::cube, 16, 16, 1, 6},
+    {"cube_array", ViewDimension::cube_array, 9, 9, 1, 12},
+    {"single_texel", ViewDimension::d2, 1, 1, 1, 1},
+    {"single_texel_cube", ViewDimension::cube, 1, 1, 1, 6},
 };
 
-bool is_cube(ViewDimension dimension) { return dimension == ViewDimension::cube || dimension == ViewDimension::cube_array; }
+bool is_cube(ViewDimension dimension) {
+    return dimension == ViewDimension::cube || dimension == ViewDimension::cube_array;
+}
 bool has_layers(const Shape& shape) {
     using enum ViewDimension;
     return shape.dimension == d1_array || shape.dimension == d2_array || shape.dimension == cube_array;
@@ -46,11 +53,13 @@ class Sampling : public testing::TestWithParam<Shape> {
                 base[axis] = is_cube(shape.dimension) ? random_float(random, -1, 1) : random_float(random, -1.6f, 2.7f);
                 dx[axis] = spread * random_float(random, -1, 1), dy[axis] = spread * random_float(random, -1, 1);
             }
-            const float layer = random_float(random, -1.0f, static_cast<float>(shape.layers / (is_cube(shape.dimension) ? 6 : 1)));
+            const float layer =
+                random_float(random, -1.0f, static_cast<float>(shape.layers / (is_cube(shape.dimension) ? 6 : 1)));
             for (std::uint32_t i = 0; i < 4; ++i) {
                 Point& point = points[4 * quad + i];
                 for (int axis = 0; axis < axes; ++axis) {
-                    const float value = base[axis] + ((i & 1) != 0 ? dx[axis] : 0.0f) + ((i & 2) != 0 ? dy[axis] : 0.0f);
+                    const float value =
+                        base[axis] + ((i & 1) != 0 ? dx[axis] : 0.0f) + ((i & 2) != 0 ? dy[axis] : 0.0f);
                     point.coordinates[axis] = std::bit_cast<std::uint32_t>(value);
                     point.gradient_x[axis] = dx[axis] * random_float(random, 0.5f, 2.0f);
                     point.gradient_y[axis] = dy[axis] * random_float(random, 0.5f, 2.0f);
@@ -79,12 +88,14 @@ class Sampling : public testing::TestWithParam<Shape> {
         return desc;
     }
 
-    // All points against the reference. Allowed: `tolerance` times the largest texel, plus 3e-5 levels of detail, which is what
-    // rounding the coordinates of a quad leaves of the differences between them.
-    void check(Format format, const rhi::SamplerDesc& desc, std::uint32_t flags, double tolerance, bool is_query = false) {
+    // All points against the reference. Allowed: `tolerance` times the largest texel, plus 3e-5 levels of detail, which
+    // is what rounding the coordinates of a quad leaves of the differences between them.
+    void check(Format format, const rhi::SamplerDesc& desc, std::uint32_t flags, double tolerance,
+               bool is_query = false) {
         const Shape& shape = GetParam();
         const std::uint32_t mips = std::min(4u, rhi::full_mip_count(shape.width, shape.height, shape.depth));
-        const TestImage image({format, shape.dimension, shape.width, shape.height, shape.depth, shape.layers, mips}, random);
+        const TestImage image({format, shape.dimension, shape.width, shape.height, shape.depth, shape.layers, mips},
+                              random);
         const SamplerState sampler{desc};
         const std::vector<Point> points = random_quads(100);
         const bool is_integer = rhi::info(format).is_integer();
@@ -94,7 +105,8 @@ class Sampling : public testing::TestWithParam<Shape> {
         std::size_t ambiguous = 0;
         for (std::size_t i = 0; i < points.size(); ++i) {
             const auto quad = std::span(points).subspan(i & ~std::size_t{3}).first<4>();
-            const ReferenceResult expected = is_query ? reference.query(flags, quad, i & 3) : reference.sample(flags, quad, i & 3);
+            const ReferenceResult expected =
+                is_query ? reference.query(flags, quad, i & 3) : reference.sample(flags, quad, i & 3);
             if (expected.is_ambiguous) {
                 ++ambiguous;
                 continue;
@@ -104,7 +116,8 @@ class Sampling : public testing::TestWithParam<Shape> {
                     const auto bits = static_cast<std::uint32_t>(static_cast<std::int64_t>(expected.value[c]));
                     ASSERT_EQ(results[i][c], bits) << "point " << i << " channel " << c;
                 } else {
-                    ASSERT_NEAR(std::bit_cast<float>(results[i][c]), expected.value[c], tolerance) << "point " << i << " channel " << c;
+                    ASSERT_NEAR(std::bit_cast<float>(results[i][c]), expected.value[c], tolerance)
+                        << "point " << i << " channel " << c;
                 }
             }
         }
@@ -116,13 +129,16 @@ class Sampling : public testing::TestWithParam<Shape> {
 };
 
 // Every lane of one call must have its own level: shapes that fit into one mip have none.
-constexpr std::uint32_t every_lod[] = {image_lod_explicit, image_lod_implicit, image_lod_gradient, image_lod_implicit | image_min_lod};
+constexpr std::uint32_t every_lod[] = {image_lod_explicit, image_lod_implicit, image_lod_gradient,
+                                       image_lod_implicit | image_min_lod};
 
 TEST_P(Sampling, FiltersEveryKindOfFormat) {
-    for (const Format format : {Format::rgba8_unorm, Format::rgba8_srgb, Format::bgra8_srgb, Format::rgba8_snorm, Format::r8_unorm, Format::rg8_unorm,
-                                Format::r16_unorm, Format::rgba16_float, Format::rg16_float, Format::r32_float, Format::rgba32_float,
-                                Format::rgb10a2_unorm, Format::rg11b10_float, Format::rgb9e5_float, Format::bc1_rgba_srgb,
-                                Format::bc3_rgba_unorm, Format::bc5_rg_snorm, Format::bc7_rgba_unorm, Format::d24_unorm_s8_uint}) {
+    for (const Format format :
+         {Format::rgba8_unorm, Format::rgba8_srgb, Format::bgra8_srgb, Format::rgba8_snorm, Format::r8_unorm,
+          Format::rg8_unorm, Format::r16_unorm, Format::rgba16_float, Format::rg16_float, Format::r32_float,
+          Format::rgba32_float, Format::rgb10a2_unorm, Format::rg11b10_float, Format::rgb9e5_float,
+          Format::bc1_rgba_srgb, Format::bc3_rgba_unorm, Format::bc5_rg_snorm, Format::bc7_rgba_unorm,
+          Format::d24_unorm_s8_uint}) {
         SCOPED_TRACE(rhi::info(format).name);
         for (const std::uint32_t lod : every_lod) {
             if (HasFatalFailure()) return;
@@ -152,7 +168,8 @@ TEST_P(Sampling, ComparesDepths) {
 TEST_P(Sampling, AppliesOffsets) {
     if (is_cube(GetParam().dimension)) return;  // Offsets do not exist for cubes.
     for (int i = 0; i < 30 && !HasFatalFailure(); ++i) {
-        check(Format::rgba16_float, random_sampler(), flags_of(ImageOperation::sample) | image_offset | every_lod[i % 4], 2e-4);
+        check(Format::rgba16_float, random_sampler(),
+              flags_of(ImageOperation::sample) | image_offset | every_lod[i % 4], 2e-4);
     }
 }
 
@@ -161,8 +178,56 @@ TEST_P(Sampling, FiltersAnisotropically) {
         rhi::SamplerDesc desc = random_sampler();
         desc.max_anisotropy = random_float(random, 1.5f, 16.0f);
         desc.magnify = desc.minify = rhi::Filter::linear;
-        check(Format::rgba8_unorm, desc, flags_of(ImageOperation::sample) | (i % 2 == 0 ? image_lod_implicit : image_lod_gradient), 1e-4);
+        check(Format::rgba8_unorm, desc,
+              flags_of(ImageOperation::sample) | (i % 2 == 0 ? image_lod_implicit : image_lod_gradient), 1e-4);
     }
+}
+
+// What gather returns are the texels of a linear sample: weighted, they are that sample.
+TEST_P(Sampling, GathersTheTexelsOfLinearSamples) {
+    const Shape& shape = GetParam();
+    using enum ViewDimension;
+    if (shape.dimension == d1 || shape.dimension == d1_array || shape.dimension == d3)
+        return;  // Gather does not exist there.
+    std::size_t inside = 0;
+    for (int i = 0; i < 40; ++i) {
+        rhi::SamplerDesc desc = random_sampler();
+        desc.magnify = desc.minify = rhi::Filter::linear;
+        desc.comparison = i % 2 != 0;
+        const TestImage image({desc.comparison ? Format::d32_float : Format::rgba32_float, shape.dimension, shape.width,
+                               shape.height, 1, shape.layers, 1},
+                              random);
+        const SamplerState sampler{desc};
+        const std::uint32_t component = desc.comparison ? 0 : random_below(random, 4);
+        const std::uint32_t offset = is_cube(shape.dimension) || i % 4 < 2 ? 0u : image_offset,
+                            compare = desc.comparison ? image_compare : 0u;
+        const std::vector<Point> points = random_quads(100);
+        const auto gathered = run_points(
+            image_function(8), 8, &image.view, &sampler,
+            {.flags = flags_of(ImageOperation::gather) | offset | compare | (component << image_component_shift)},
+            points);
+        const auto sampled =
+            run_points(image_function(8), 8, &image.view, &sampler,
+                       {.flags = flags_of(ImageOperation::sample) | image_lod_explicit | offset | compare}, points);
+        for (std::size_t p = 0; p < points.size(); ++p) {
+            double u = std::bit_cast<float>(points[p].coordinates[0]),
+                   v = std::bit_cast<float>(points[p].coordinates[1]);
+            if (is_cube(shape.dimension)) {
+                // Faces +Z and -Z only: the others are the same but for the names of their axes.
+                const double z = std::bit_cast<float>(points[p].coordinates[2]);
+                if (std::abs(z) <= std::max(std::abs(u), std::abs(v))) continue;
+                u = 0.5 * u / z + 0.5, v = 0.5 * -v / std::abs(z) + 0.5;
+            }
+            ++inside;
+            u = u * shape.width - 0.5, v = v * shape.height - 0.5;
+            const double fx = u - std::floor(u), fy = v - std::floor(v);
+            const double weights[4] = {(1 - fx) * fy, fx * fy, fx * (1 - fy), (1 - fx) * (1 - fy)};
+            double sum = 0.0;
+            for (int tap = 0; tap < 4; ++tap) sum += weights[tap] * std::bit_cast<float>(gathered[p][tap]);
+            ASSERT_NEAR(sum, std::bit_cast<float>(sampled[p][component]), 2e-3) << "sampler " << i << " point " << p;
+        }
+    }
+    EXPECT_GT(inside, 500u);
 }
 
 TEST_P(Sampling, TellsTheLevelOfDetail) {
@@ -172,7 +237,8 @@ TEST_P(Sampling, TellsTheLevelOfDetail) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Shapes, Sampling, testing::ValuesIn(shapes), [](const auto& each) { return std::string(each.param.name); });
+INSTANTIATE_TEST_SUITE_P(Shapes, Sampling, testing::ValuesIn(shapes),
+                         [](const auto& each) { return std::string(each.param.name); });
 
 }  // namespace
 }  // namespace nacre::cpu::test

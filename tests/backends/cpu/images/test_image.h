@@ -25,7 +25,9 @@ inline std::uint32_t random_bits(Random& random) { return static_cast<std::uint3
 inline float random_float(Random& random, float low, float high) {
     return low + (high - low) * static_cast<float>(random() >> 8) * 0x1p-24f;
 }
-inline std::uint32_t random_below(Random& random, std::uint32_t count) { return static_cast<std::uint32_t>(random() % count); }
+inline std::uint32_t random_below(Random& random, std::uint32_t count) {
+    return static_cast<std::uint32_t>(random() % count);
+}
 
 struct ImageShape {
     rhi::Format format = rhi::Format::rgba8_unorm;
@@ -36,12 +38,12 @@ struct ImageShape {
     std::uint32_t samples = 1;
 };
 
-/// An image in memory. `content[mip][layer]` holds the texels of all slices and samples without padding; they lie one sample after
-/// the other.
+/// An image in memory. `content[mip][layer]` holds the texels of all slices and samples without padding; they lie one
+/// sample after the other.
 class TestImage {
   public:
-    /// Texels with values in [-4, 4] where the format has a sign, else [0, 4] (fixed point: [-1, 1] or [0, 1]); integers of all
-    /// bits; compressed formats of random blocks.
+    /// Texels with values in [-4, 4] where the format has a sign, else [0, 4] (fixed point: [-1, 1] or [0, 1]);
+    /// integers of all bits; compressed formats of random blocks.
     TestImage(const ImageShape& wanted, Random& random) : shape(wanted) {
         view.format = shape.format;
         view.dimension = shape.dimension;
@@ -87,7 +89,9 @@ class TestImage {
         const bool is_depth = facts.is_depth_stencil();
         const bool is_fixed = facts.kind == rhi::FormatKind::unorm || facts.kind == rhi::FormatKind::srgb || is_depth;
         const float high = is_fixed || facts.kind == rhi::FormatKind::snorm ? 1.0f : 4.0f;
-        const float low = is_fixed || shape.format == rhi::Format::rg11b10_float || shape.format == rhi::Format::rgb9e5_float ? 0.0f : -high;
+        const float low =
+            is_fixed || shape.format == rhi::Format::rg11b10_float || shape.format == rhi::Format::rgb9e5_float ? 0.0f
+                                                                                                                : -high;
         Texel texel;
         for (float& channel : texel.f) channel = random_float(random, low, high);
         encode_texel(shape.format, texel, at);
@@ -131,12 +135,14 @@ inline void set_lane(ImageArguments& arguments, std::uint32_t lane, const Point&
 
 /// Runs an operation for all points, `lanes` at once.
 inline std::vector<Result> run_points(NacreCpuImageFunction function, std::uint32_t lanes, const ImageView* image,
-                                      const SamplerState* sampler, const Request& request, std::span<const Point> points) {
+                                      const SamplerState* sampler, const Request& request,
+                                      std::span<const Point> points) {
     std::vector<Result> results(points.size());
     ImageArguments arguments{};
     for (std::size_t first = 0; first < points.size(); first += lanes) {
         const std::size_t count = std::min<std::size_t>(lanes, points.size() - first);
-        for (std::uint32_t lane = 0; lane < lanes; ++lane) set_lane(arguments, lane, points[first + std::min<std::size_t>(lane, count - 1)]);
+        for (std::uint32_t lane = 0; lane < lanes; ++lane)
+            set_lane(arguments, lane, points[first + std::min<std::size_t>(lane, count - 1)]);
         for (int i = 0; i < 4; ++i) {
             for (int axis = 0; axis < 2; ++axis) arguments.gather_offsets[i][axis] = request.gather_offsets[i][axis];
         }
@@ -154,7 +160,8 @@ inline std::uint32_t coordinate_count(rhi::ViewDimension dimension) {
     using enum rhi::ViewDimension;
     switch (dimension) {
         case d1: return 1;
-        case d1_array: case d2: return 2;
+        case d1_array:
+        case d2: return 2;
         case cube_array: return 4;
         default: return 3;
     }

@@ -21,13 +21,17 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 
 // (-1)^sign * 2^(e - bias) * (1 + m / 2^bits), by the definition.
 double floating_value(std::uint32_t code, int exponent_bits, int mantissa_bits, bool has_sign) {
-    const std::uint32_t mantissa = code & ((1u << mantissa_bits) - 1), exponent = (code >> mantissa_bits) & ((1u << exponent_bits) - 1);
+    const std::uint32_t mantissa = code & ((1u << mantissa_bits) - 1),
+                        exponent = (code >> mantissa_bits) & ((1u << exponent_bits) - 1);
     const bool is_negative = has_sign && ((code >> (mantissa_bits + exponent_bits)) & 1) != 0;
     const int bias = (1 << (exponent_bits - 1)) - 1;
     double value;
-    if (exponent == (1u << exponent_bits) - 1) value = mantissa == 0 ? infinite : not_a_number;
-    else if (exponent == 0) value = std::ldexp(mantissa, 1 - bias - mantissa_bits);
-    else value = std::ldexp(1.0 + std::ldexp(mantissa, -mantissa_bits), static_cast<int>(exponent) - bias);
+    if (exponent == (1u << exponent_bits) - 1)
+        value = mantissa == 0 ? infinite : not_a_number;
+    else if (exponent == 0)
+        value = std::ldexp(mantissa, 1 - bias - mantissa_bits);
+    else
+        value = std::ldexp(1.0 + std::ldexp(mantissa, -mantissa_bits), static_cast<int>(exponent) - bias);
     return is_negative ? -value : value;
 }
 
@@ -67,7 +71,8 @@ void expect_same(double found, double wanted, const char* what, std::uint32_t co
 bool has_plain_channels(Format format) {
     const rhi::FormatInfo& facts = rhi::info(format);
     if (format == Format::undefined || facts.is_compressed() || facts.is_depth_stencil()) return false;
-    return format != Format::rgb10a2_unorm && format != Format::rgb10a2_uint && format != Format::rg11b10_float && format != Format::rgb9e5_float;
+    return format != Format::rgb10a2_unorm && format != Format::rgb10a2_uint && format != Format::rg11b10_float &&
+           format != Format::rgb9e5_float;
 }
 
 TEST(TexelFormats, DecodeEveryPatternOfEveryChannel) {
@@ -84,11 +89,12 @@ TEST(TexelFormats, DecodeEveryPatternOfEveryChannel) {
             std::byte memory[16];
             for (std::byte& each : memory) each = static_cast<std::byte>(random());
             const std::uint32_t code = bits == 32 ? static_cast<std::uint32_t>(random()) : i;
-            const int channel = static_cast<int>(random() % facts.channels), place = is_bgra && channel < 3 ? 2 - channel : channel;
+            const int channel = static_cast<int>(random() % facts.channels),
+                      place = is_bgra && channel < 3 ? 2 - channel : channel;
             std::memcpy(memory + place * bytes, &code, static_cast<std::size_t>(bytes));
             const Texel texel = decode_texel(format, memory);
-            ASSERT_NO_FATAL_FAILURE(
-                expect_same(channel_of(texel, channel, facts.kind), channel_value(code, bits, facts.kind, channel == 3), "code", code));
+            ASSERT_NO_FATAL_FAILURE(expect_same(channel_of(texel, channel, facts.kind),
+                                                channel_value(code, bits, facts.kind, channel == 3), "code", code));
             for (int c = facts.channels; c < 4; ++c) ASSERT_EQ(channel_of(texel, c, facts.kind), c == 3 ? 1.0 : 0.0);
 
             // What was decoded is encoded to the same bits. Exceptions: the second code of -1, payloads of NaN.
@@ -117,10 +123,12 @@ TEST(TexelFormats, DecodePackedFormats) {
         std::memcpy(memory, &bits, 4);
         const Texel small = decode_texel(Format::rg11b10_float, memory);
         ASSERT_NO_FATAL_FAILURE(expect_same(small.f[0], floating_value(bits & 2047, 5, 6, false), "red", bits));
-        ASSERT_NO_FATAL_FAILURE(expect_same(small.f[1], floating_value((bits >> 11) & 2047, 5, 6, false), "green", bits));
+        ASSERT_NO_FATAL_FAILURE(
+            expect_same(small.f[1], floating_value((bits >> 11) & 2047, 5, 6, false), "green", bits));
         ASSERT_NO_FATAL_FAILURE(expect_same(small.f[2], floating_value(bits >> 22, 5, 5, false), "blue", bits));
         const Texel shared = decode_texel(Format::rgb9e5_float, memory);
-        const Texel unorm = decode_texel(Format::rgb10a2_unorm, memory), uint = decode_texel(Format::rgb10a2_uint, memory);
+        const Texel unorm = decode_texel(Format::rgb10a2_unorm, memory),
+                    uint = decode_texel(Format::rgb10a2_uint, memory);
         for (int c = 0; c < 3; ++c) {
             ASSERT_EQ(shared.f[c], std::ldexp((bits >> (9 * c)) & 511, static_cast<int>(bits >> 27) - 24));
             ASSERT_EQ(uint.u[c], (bits >> (10 * c)) & 1023);
@@ -167,8 +175,11 @@ TEST(TexelFormats, EncodingTakesTheNearestCode) {
         Texel texel;
         const auto draw = [&] {
             // Half of the values close to ties of 8 bits, the others of all magnitudes.
-            if (random() % 2 == 0) return static_cast<float>((static_cast<double>(random() % 255) + 0.5) / 255 + std::ldexp(static_cast<double>(random() % 5) - 2, -26));
-            return std::ldexp(static_cast<float>(random() >> 8), -24 - static_cast<int>(random() % 24)) * (random() % 8 == 0 ? 65536.0f : 1.0f);
+            if (random() % 2 == 0)
+                return static_cast<float>((static_cast<double>(random() % 255) + 0.5) / 255 +
+                                          std::ldexp(static_cast<double>(random() % 5) - 2, -26));
+            return std::ldexp(static_cast<float>(random() >> 8), -24 - static_cast<int>(random() % 24)) *
+                   (random() % 8 == 0 ? 65536.0f : 1.0f);
         };
         for (float& each : texel.f) each = draw();
         const float x = texel.f[0];
@@ -181,20 +192,26 @@ TEST(TexelFormats, EncodingTakesTheNearestCode) {
             return word;
         };
         const double unit = std::min(x, 1.0f);
-        ASSERT_NO_FATAL_FAILURE(expect_nearest(unit * 255.0, encoded(Format::r8_unorm), 255, [](std::uint32_t c) { return static_cast<double>(c); }));
-        ASSERT_NO_FATAL_FAILURE(expect_nearest(unit * 65535.0, encoded(Format::r16_unorm), 65535, [](std::uint32_t c) { return static_cast<double>(c); }));
-        ASSERT_NO_FATAL_FAILURE(expect_nearest(unit * 127.0, encoded(Format::r8_snorm), 127, [](std::uint32_t c) { return static_cast<double>(c); }));
+        ASSERT_NO_FATAL_FAILURE(expect_nearest(unit * 255.0, encoded(Format::r8_unorm), 255,
+                                               [](std::uint32_t c) { return static_cast<double>(c); }));
+        ASSERT_NO_FATAL_FAILURE(expect_nearest(unit * 65535.0, encoded(Format::r16_unorm), 65535,
+                                               [](std::uint32_t c) { return static_cast<double>(c); }));
+        ASSERT_NO_FATAL_FAILURE(expect_nearest(unit * 127.0, encoded(Format::r8_snorm), 127,
+                                               [](std::uint32_t c) { return static_cast<double>(c); }));
         // The nearest sRGB code is the nearest after the inverse function.
         const double srgb = unit <= 0.0031308 ? 12.92 * unit : 1.055 * std::pow(unit, 1 / 2.4) - 0.055;
         ASSERT_NEAR(encoded(Format::rgba8_srgb) & 255, srgb * 255.0, 0.5 + 2e-4);
         if (x < 65504.0f) {
-            ASSERT_NO_FATAL_FAILURE(expect_nearest(x, encoded(Format::r16_float), 0x7bff, [](std::uint32_t c) { return floating_value(c, 5, 10, true); }));
+            ASSERT_NO_FATAL_FAILURE(expect_nearest(x, encoded(Format::r16_float), 0x7bff,
+                                                   [](std::uint32_t c) { return floating_value(c, 5, 10, true); }));
             const std::uint32_t small = encoded(Format::rg11b10_float);
             if (x < 65024.0f) {
-                ASSERT_NO_FATAL_FAILURE(expect_nearest(x, small & 2047, 0x7bf, [](std::uint32_t c) { return floating_value(c, 5, 6, false); }));
+                ASSERT_NO_FATAL_FAILURE(expect_nearest(x, small & 2047, 0x7bf,
+                                                       [](std::uint32_t c) { return floating_value(c, 5, 6, false); }));
             }
             if (texel.f[2] < 64512.0f) {
-                ASSERT_NO_FATAL_FAILURE(expect_nearest(texel.f[2], small >> 22, 0x3df, [](std::uint32_t c) { return floating_value(c, 5, 5, false); }));
+                ASSERT_NO_FATAL_FAILURE(expect_nearest(texel.f[2], small >> 22, 0x3df,
+                                                       [](std::uint32_t c) { return floating_value(c, 5, 5, false); }));
             }
         }
         // Shared exponents: half a step of the largest channel; and no smaller exponent could have held it.
@@ -240,11 +257,13 @@ TEST(TexelFormats, EncodingClampsAndKnowsSpecialValues) {
     EXPECT_GT(encoded(Format::r16_float, nan) & 0x7fff, 0x7c00u);
     EXPECT_EQ(encoded(Format::rg11b10_float, 1e30f), 0x7bfu | (0x7bfu << 11) | (0x3dfu << 22));
     EXPECT_EQ(encoded(Format::rg11b10_float, infinity), 0x7c0u | (0x7c0u << 11) | (0x3e0u << 22));
-    EXPECT_TRUE(std::isnan(decode_texel(Format::rg11b10_float, [&] {
-                               static std::uint32_t word;
-                               word = encoded(Format::rg11b10_float, nan);
-                               return reinterpret_cast<const std::byte*>(&word);
-                           }()).f[2]));
+    EXPECT_TRUE(std::isnan(decode_texel(Format::rg11b10_float,
+                                        [&] {
+                                            static std::uint32_t word;
+                                            word = encoded(Format::rg11b10_float, nan);
+                                            return reinterpret_cast<const std::byte*>(&word);
+                                        }())
+                               .f[2]));
     EXPECT_EQ(encoded(Format::rgb9e5_float, infinity), 0x1ffu * 0x40201u | (31u << 27));
     const std::byte nothing[16] = {};
     for (const std::uint32_t channel : decode_texel(Format::undefined, nothing).u) EXPECT_EQ(channel, 0u);

@@ -19,7 +19,8 @@ struct Function {
     const char* name;
     llvm::Value* (Math::*emit)(llvm::Value*);
     double (*expected)(double);
-    /// Largest error allowed, in units of the last place. At most what Vulkan allows.
+    /// Largest error allowed, in units of the last place: that over all floats, rounded up. Far less than Vulkan
+    /// allows.
     double ulps;
     /// Where the bound holds; beyond, results are only bounded in magnitude.
     double range = std::numeric_limits<double>::infinity();
@@ -33,22 +34,24 @@ double inverse_sqrt(double x) { return 1 / std::sqrt(x); }
 
 const Function functions[] = {
     // Near the zeros of large arguments it is the absolute error that can be small.
-    {"sin", &Math::sin, std::sin, 2.5, 1e5, 0x1p-32, true},
-    {"cos", &Math::cos, std::cos, 2.5, 1e5, 0x1p-32, true},
-    {"tan", &Math::tan, std::tan, 8, 1e5, 0x1p-32},
-    {"asin", &Math::asin, std::asin, 3},
-    {"acos", &Math::acos, std::acos, 3},
-    {"atan", &Math::atan, std::atan, 3},
-    {"sinh", &Math::sinh, std::sinh, 3},
-    {"cosh", &Math::cosh, std::cosh, 3},
-    {"tanh", &Math::tanh, std::tanh, 3},
-    {"asinh", &Math::asinh, std::asinh, 3},
-    {"acosh", &Math::acosh, std::acosh, 3},
-    {"atanh", &Math::atanh, std::atanh, 3},
-    {"exp", &Math::exp, std::exp, 2},
-    {"exp2", &Math::exp2, std::exp2, 2},
-    {"log", &Math::log, std::log, 2},
-    {"log2", &Math::log2, std::log2, 2.25},
+    {"sin", &Math::sin, std::sin, 2, 1e5, 0x1p-32, true},
+    {"cos", &Math::cos, std::cos, 2.3, 1e5, 0x1p-32, true},
+    {"tan", &Math::tan, std::tan, 4.5, 1e3, 0x1p-32},
+    // Single precision numbers come as near to its poles as 2^-24.
+    {"tan_of_large_x", &Math::tan, std::tan, 40, 1e5, 0x1p-32},
+    {"asin", &Math::asin, std::asin, 2.4},
+    {"acos", &Math::acos, std::acos, 1.3},
+    {"atan", &Math::atan, std::atan, 2},
+    {"sinh", &Math::sinh, std::sinh, 1.65},
+    {"cosh", &Math::cosh, std::cosh, 1.5},
+    {"tanh", &Math::tanh, std::tanh, 1.35},
+    {"asinh", &Math::asinh, std::asinh, 1.8},
+    {"acosh", &Math::acosh, std::acosh, 2.45},
+    {"atanh", &Math::atanh, std::atanh, 2.1},
+    {"exp", &Math::exp, std::exp, 1.05},
+    {"exp2", &Math::exp2, std::exp2, 1.1},
+    {"log", &Math::log, std::log, 0.9},
+    {"log2", &Math::log2, std::log2, 2.3},
     {"sqrt", &Math::sqrt, std::sqrt, 0.5},
     {"inverse_sqrt", &Math::inverse_sqrt, inverse_sqrt, 1.5},
 };

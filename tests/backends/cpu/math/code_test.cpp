@@ -33,37 +33,38 @@ TEST(Code, of_sixteen_lanes_is_short_and_calls_nothing) {
         const char* name;
         Emit emit;
         std::vector<Kind> inputs;
-        unsigned most;  ///< Instructions, without contraction.
+        unsigned
+            most;  ///< Instructions without contraction, as counted with LLVM 19.1; a few more are no fault, many are.
     } functions[] = {
-        {"sin", call(&Math::sin), {Kind::single}, 30},
+        {"sin", call(&Math::sin), {Kind::single}, 29},
         {"cos", call(&Math::cos), {Kind::single}, 32},
-        {"tan", call(&Math::tan), {Kind::single}, 42},
-        {"asin", call(&Math::asin), {Kind::single}, 30},
-        {"acos", call(&Math::acos), {Kind::single}, 34},
-        {"atan", call(&Math::atan), {Kind::single}, 32},
-        {"atan2", call(&Math::atan2), {Kind::single, Kind::single}, 44},
-        {"sinh", call(&Math::sinh), {Kind::single}, 48},
-        {"tanh", call(&Math::tanh), {Kind::single}, 50},
-        {"exp", call(&Math::exp), {Kind::single}, 32},
-        {"exp2", call(&Math::exp2), {Kind::single}, 28},
-        {"log", call(&Math::log), {Kind::single}, 50},
-        {"log2", call(&Math::log2), {Kind::single}, 42},
-        {"pow", call(&Math::pow), {Kind::single, Kind::single}, 75},
-        {"inverse_sqrt", call(&Math::inverse_sqrt), {Kind::single}, 4},
-        {"float_to_half", call(&Math::float_to_half), {Kind::single}, 30},
-        {"half_to_float", call(&Math::half_to_float), {Kind::int32}, 20},
+        {"tan", call(&Math::tan), {Kind::single}, 37},
+        {"asin", call(&Math::asin), {Kind::single}, 22},
+        {"acos", call(&Math::acos), {Kind::single}, 27},
+        {"atan", call(&Math::atan), {Kind::single}, 27},
+        {"atan2", call(&Math::atan2), {Kind::single, Kind::single}, 38},
+        {"sinh", call(&Math::sinh), {Kind::single}, 45},
+        {"tanh", call(&Math::tanh), {Kind::single}, 49},
+        {"exp", call(&Math::exp), {Kind::single}, 30},
+        {"exp2", call(&Math::exp2), {Kind::single}, 26},
+        {"log", call(&Math::log), {Kind::single}, 44},
+        {"log2", call(&Math::log2), {Kind::single}, 38},
+        {"pow", call(&Math::pow), {Kind::single, Kind::single}, 67},
+        {"inverse_sqrt", call(&Math::inverse_sqrt), {Kind::single}, 3},
+        {"float_to_half", call(&Math::float_to_half), {Kind::single}, 16},
+        {"half_to_float", call(&Math::half_to_float), {Kind::int32}, 14},
         {"round", call(&Math::round), {Kind::single}, 4},
-        {"s_div", call(&Math::s_div), {Kind::int32, Kind::int32}, 24},
-        {"u_mod", call(&Math::u_mod), {Kind::int32, Kind::int32}, 24},
+        {"s_div", call(&Math::s_div), {Kind::int32, Kind::int32}, 21},
+        {"u_mod", call(&Math::u_mod), {Kind::int32, Kind::int32}, 17},
         {"find_u_msb", call(&Math::find_u_msb), {Kind::int32}, 3},
-        {"bit_reverse", call(&Math::bit_reverse), {Kind::int32}, 12},
+        {"bit_reverse", call(&Math::bit_reverse), {Kind::int32}, 10},
     };
     for (const auto& function : functions) {
         const Code code = code_of({.processor = "x86-64-v4"}, function.inputs, function.emit);
         const Code contracted =
             code_of({.processor = "x86-64-v4", .options = {.contract = true, .half_instructions = true}},
                     function.inputs, function.emit);
-        EXPECT_LE(code.instructions, function.most) << function.name;
+        EXPECT_LE(code.instructions, function.most + 3) << function.name;
         EXPECT_LE(contracted.instructions, code.instructions) << function.name;
         EXPECT_FALSE(code.has_calls || contracted.has_calls) << function.name;
         std::printf("%s: %u, %u\n", function.name, code.instructions, contracted.instructions);

@@ -117,5 +117,35 @@ TEST_P(Coverage, MeshesCoverEveryPixelOnce) {
     }
 }
 
+TEST(Order, LastTriangleWinsWhateverItsSize) {
+    // Large ones are kept apart from the bins of the tiles, small ones lie in them; here they alternate.
+    constexpr std::uint32_t size = 512;
+    std::mt19937 random(13);
+    std::vector<Point> points;
+    std::vector<TestVertex> vertices;
+    for (int triangle = 0; triangle < 700; ++triangle) {
+        const int reach = (random() % 4 == 0 ? 500 : 60) * 256;
+        const Point center{static_cast<int>(random() % (size * 256)), static_cast<int>(random() % (size * 256))};
+        for (int corner = 0; corner < 3; ++corner) {
+            points.push_back({center.x + static_cast<int>(random() % (2 * reach)) - reach,
+                              center.y + static_cast<int>(random() % (2 * reach)) - reach});
+            vertices.push_back(at_window(points.back().x / 256.0, points.back().y / 256.0, size, size));
+        }
+    }
+    TestImage image(Format::r32_uint, size, size);
+    Bench bench(size, size, {&image}, nullptr, {.threads = 3});
+    bench.use<TestShader::primitive_id>(1);
+    bench.draw(vertices);
+    bench.end();
+    for (std::uint32_t y = 0; y < size; y += 3)
+        for (std::uint32_t x = 0; x < size; ++x) {
+            std::uint32_t expected = 0;
+            for (std::size_t i = points.size(); i != 0 && expected == 0; i -= 3)
+                if (covers(points[i - 3], points[i - 2], points[i - 1], {x * 256 + 128, y * 256 + 128}))
+                    expected = static_cast<std::uint32_t>(i / 3);
+            ASSERT_EQ(image.at<std::uint32_t>(x, y), expected) << x << ", " << y;
+        }
+}
+
 }  // namespace
 }  // namespace nacre::test

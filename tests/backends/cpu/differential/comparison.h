@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "tests/backends/cpu/differential/device_runner.h"
+
+namespace nacre::differential {
+
+/// Runs shaders on several devices and says where they differ. Devices are made when they are needed first.
+class Comparison {
+  public:
+    struct Difference {
+        std::string first, second;   ///< Devices, "optimized" behind one that ran the optimized module.
+        std::string what;            ///< Place and values, or the error.
+    };
+
+    /// Told before each run on a device, so that a crash can be laid at its door.
+    std::function<void(const std::string& device)> before_run = [](const std::string&) {};
+    /// Compare with Vulkan, too.
+    bool has_vulkan = true;
+
+    /// The first difference between the devices that this seed takes; nothing where all agree.
+    std::optional<Difference> check(const GeneratedShader& shader);
+    /// The shortest text that still has the same two devices differ.
+    std::string reduce(const GeneratedShader& shader, const Difference& difference);
+
+  private:
+    Expected<Output> run(const std::string& device, const std::string& text, Stage stage);
+    std::optional<Difference> compare(const std::string& first, const std::string& second, const std::string& text, Stage stage);
+    std::map<std::string, std::unique_ptr<DeviceRunner>> runners_;
+    std::map<std::string, Output> outputs_;  ///< Of the text that is being compared.
+    std::string compared_;
+};
+
+}  // namespace nacre::differential

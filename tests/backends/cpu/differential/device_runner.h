@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "rhi/device.h"
+#include "tests/backends/cpu/differential/generated_shader.h"
+
+namespace nacre::differential {
+
+/// What one run of a shader wrote.
+struct Output {
+    std::vector<std::uint32_t> words;   ///< Of all buffers and images, one behind another.
+    std::vector<float> pairs;           ///< Arguments and results of approximate functions; compute shaders only.
+    /// Names the place of a word: "result[5][3]".
+    [[nodiscard]] static std::string place_of(std::size_t word, Stage stage);
+};
+
+/// SPIR-V of a generated text, in which no multiplication and addition may be fused: without that, bits are the device's choice.
+Expected<std::vector<std::uint32_t>> compile(const std::string& text, Stage stage);
+/// The same module as the performance passes of SPIRV-Tools leave it.
+std::vector<std::uint32_t> optimized(const std::vector<std::uint32_t>& words);
+
+/// One device, with the inputs that all shaders read.
+class DeviceRunner {
+  public:
+    /// @param spec  of the backend: "cpu:fast:lanes=8"
+    static Expected<std::unique_ptr<DeviceRunner>> create(const std::string& spec);
+    Expected<Output> run(const std::vector<std::uint32_t>& words, Stage stage);
+    ~DeviceRunner();
+
+  private:
+    struct Objects;
+    explicit DeviceRunner(std::unique_ptr<Objects> objects);
+    std::unique_ptr<Objects> objects_;
+};
+
+}  // namespace nacre::differential
