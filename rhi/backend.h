@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -79,6 +80,11 @@ class BackendQueryPool : public BackendObject {
   public:
     QueryPoolDesc desc;
 };
+class BackendAccelerationStructure : public BackendObject {
+  public:
+    AccelerationStructureDesc desc;
+    std::atomic<std::uint64_t> memory_bytes{0};  ///< May change with each build.
+};
 
 /// A resolved bind-group entry: complete ranges and views, backend objects.
 struct BackendBinding {
@@ -88,6 +94,7 @@ struct BackendBinding {
     std::uint64_t offset = 0, size = 0;
     ViewReference view{};  ///< texture.object set for textures and images.
     BackendSampler* sampler = nullptr;
+    BackendAccelerationStructure* acceleration_structure = nullptr;
 };
 
 struct BackendGraphicsPipelineDesc {
@@ -120,6 +127,7 @@ struct ResourceState {
 struct Barrier {
     BackendBuffer* buffer = nullptr;
     BackendTexture* texture = nullptr;
+    BackendAccelerationStructure* acceleration_structure = nullptr;
     std::uint32_t base_mip = 0, mip_count = 0, base_layer = 0, layer_count = 0;
     ResourceState before, after;
     bool discard = false;  ///< The old content is not needed.
@@ -172,6 +180,9 @@ class BackendDevice {
     virtual Expected<std::unique_ptr<BackendComputePipeline>> create_compute_pipeline(
         const BackendComputePipelineDesc& desc) = 0;
     virtual Expected<std::unique_ptr<BackendQueryPool>> create_query_pool(const QueryPoolDesc& desc) = 0;
+    /// Only called on devices with Capabilities::ray_query; the others need not have it.
+    virtual Expected<std::unique_ptr<BackendAccelerationStructure>> create_acceleration_structure(
+        const AccelerationStructureDesc& desc);
 
     /// Host writes to a mapped range are done (upload), or are about to be read (readback, after its work is complete).
     virtual Expected<void> flush_mapped(BackendBuffer& buffer) = 0;

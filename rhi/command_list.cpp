@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rhi/command_list.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "rhi/backend.h"
@@ -263,6 +264,78 @@ void CommandList::clear_depth_stencil(const TextureView& view, float depth, std:
 void CommandList::generate_mips(Texture texture) {
     NACRE_RECORD_IF_VALID(generate_mips(texture));
     stream_->append<GenerateMipsCommand>().texture.handle = texture;
+}
+
+namespace {
+
+BuildAccelerationStructureCommand& record(CommandStream& stream, AccelerationStructure structure, std::span<const GeometrySource> sources,
+            bool is_update) {
+    auto& command = stream.append<BuildAccelerationStructureCommand>(sources.size() * sizeof(GeometrySourceCommand));
+    command.structure.handle = structure;
+    command.count = static_cast<std::uint32_t>(sources.size());
+    command.is_update = is_update;
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+        auto* source = new (command.sources() + i) GeometrySourceCommand{};
+        source->vertices.handle = sources[i].vertices;
+        source->indices.handle = sources[i].indices;
+        source->vertex_offset = sources[i].vertex_offset;
+        source->index_offset = sources[i].index_offset;
+    }
+    return command;
+}
+
+BuildAccelerationStructureCommand& record(CommandStream& stream, AccelerationStructure structure,
+            std::span<const AccelerationStructureInstance> instances, bool is_update) {
+    auto& command = stream.append<BuildAccelerationStructureCommand>(instances.size() * sizeof(InstanceCommand));
+    command.structure.handle = structure;
+    command.count = static_cast<std::uint32_t>(instances.size());
+    command.is_top = true;
+    command.is_update = is_update;
+    for (std::size_t i = 0; i < instances.size(); ++i) {
+        auto* instance = new (command.instances() + i) InstanceCommand{};
+        instance->bottom_level.handle = instances[i].bottom_level;
+        instance->transform = instances[i].transform;
+        instance->custom_index = instances[i].custom_index;
+        instance->table_offset = instances[i].table_offset;
+        instance->mask = instances[i].mask;
+        instance->flags = instances[i].flags;
+    }
+    return command;
+}
+
+/// Bytes of a command are counted in 32 bits; more sources than any structure takes are not recorded in full.
+template <typename Source>
+std::span<const Source> recordable(std::span<const Source> sources) {
+    return sources.first(std::min<std::size_t>(sources.size(), max_structure_instances + std::size_t{1}));
+}
+
+}  // namespace
+
+void CommandList::build_acceleration_structure(AccelerationStructure bottom_level,
+                                               std::span<const GeometrySource> sources) {
+    record_build(bottom_level, sources, false);
+}
+void CommandList::build_acceleration_structure(AccelerationStructure top_level,
+                                               std::span<const AccelerationStructureInstance> instances) {
+    record_build(top_level, instances, false);
+}
+void CommandList::update_acceleration_structure(AccelerationStructure bottom_level,
+                                                std::span<const GeometrySource> sources) {
+    record_build(bottom_level, sources, true);
+}
+void CommandList::update_acceleration_structure(AccelerationStructure top_level,
+                                                std::span<const AccelerationStructureInstance> instances) {
+    record_build(top_level, instances, true);
+}
+
+template <typename Source>
+void CommandList::record_build(AccelerationStructure structure, std::span<const Source> sources, bool is_update) {
+    NACRE_RECORD;
+    BuildAccelerationStructureCommand& command = record(*stream_, structure, recordable(sources), is_update);
+    // Checked where it lies: a failed list is not submitted.
+    if (stream_->validator)
+        if (Check problem = stream_->validator->build_acceleration_structure(command))
+            stream_->status = stream_->validator->reject(*problem);
 }
 
 void CommandList::write_timestamp(QueryPool pool, std::uint32_t index) {

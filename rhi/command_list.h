@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "rhi/acceleration_structure.h"
 #include "rhi/pipeline.h"
 
 /// @file
@@ -111,19 +112,23 @@ enum class ResourceUse : std::uint32_t {
     color_target = 128, depth_stencil_write = 256, depth_stencil_read = 512,
     copy_source = 1024, copy_destination = 2048, resolve_source = 4096, resolve_destination = 8192,
     host_read = 16384,
+    build_input = 32768,                    ///< Vertices and indices of a build.
+    acceleration_structure_read = 65536,    ///< By shaders, and of bottom levels by builds of top levels.
+    acceleration_structure_write = 131072,  ///< Built or updated.
 };
 NACRE_FLAGS(ResourceUse)
 
 /// All uses that change content.
 inline constexpr ResourceUse writing_uses = ResourceUse::storage_write | ResourceUse::color_target |
                                             ResourceUse::depth_stencil_write | ResourceUse::copy_destination |
-                                            ResourceUse::resolve_destination;
+                                            ResourceUse::resolve_destination | ResourceUse::acceleration_structure_write;
 
 /// One line of an explicit statement (see `CommandList::begin_statement`).
 struct StatedAccess {
     Buffer buffer{};    ///< Either this
-    Texture texture{};  ///< or this.
+    Texture texture{};  ///< or this
     ResourceUse use = ResourceUse::none;
+    AccelerationStructure acceleration_structure{};  ///< or this.
 };
 
 /// Records commands. Movable. Wrong calls do not stop the recording: the first error is kept, later calls of
@@ -185,6 +190,19 @@ class CommandList {
     /// Fills mips 1 and up of every layer from mip 0 with a 2x2 box filter (linear light for srgb formats).
     void generate_mips(Texture texture);
 
+    /// Builds a bottom level: one source for each of its geometries. Vertices that are not finite, and indices beyond the vertices,
+    /// make triangles that are never hit.
+    void build_acceleration_structure(AccelerationStructure bottom_level, std::span<const GeometrySource> sources);
+    /// Builds a top level; the position of an instance is what shaders read as instance id. Every bottom level must be built before.
+    /// A top level is built again after any of its bottom levels was built or updated.
+    void build_acceleration_structure(AccelerationStructure top_level,
+                                      std::span<const AccelerationStructureInstance> instances);
+    /// The same for a structure that was built and made with `allow_update`: faster, for content that has moved a little. Counts and
+    /// indices must be those of the last build.
+    void update_acceleration_structure(AccelerationStructure bottom_level, std::span<const GeometrySource> sources);
+    void update_acceleration_structure(AccelerationStructure top_level,
+                                       std::span<const AccelerationStructureInstance> instances);
+
     // Queries. A pool's entry is reset when it is written; read it with `Device::read_queries`.
     void write_timestamp(QueryPool pool, std::uint32_t index);
     void begin_occlusion_query(QueryPool pool, std::uint32_t index);
@@ -201,6 +219,8 @@ class CommandList {
 
   private:
     friend class Device;
+    template <typename Source>
+    void record_build(AccelerationStructure structure, std::span<const Source> sources, bool is_update);
     explicit CommandList(std::unique_ptr<CommandStream> stream);
     std::unique_ptr<CommandStream> stream_;
 };

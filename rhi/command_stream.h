@@ -25,6 +25,7 @@ class BackendBindGroup;
 class BackendGraphicsPipeline;
 class BackendComputePipeline;
 class BackendQueryPool;
+class BackendAccelerationStructure;
 
 /// A handle while recording; the backend's object after the front end's `resolve`.
 template <typename HandleType, typename ObjectType>
@@ -37,6 +38,7 @@ union ObjectReference {
 using BufferReference = ObjectReference<Buffer, BackendBuffer>;
 using TextureReference = ObjectReference<Texture, BackendTexture>;
 using BindGroupReference = ObjectReference<BindGroup, BackendBindGroup>;
+using AccelerationStructureReference = ObjectReference<AccelerationStructure, BackendAccelerationStructure>;
 
 /// A resolved range of a texture: no `all_remaining`, no automatic dimension, no undefined format.
 struct ViewReference {
@@ -52,7 +54,7 @@ enum class CommandType : std::uint16_t {
     set_index_buffer, set_viewport, set_scissor, set_stencil_reference, set_blend_constants,
     draw, draw_indexed, draw_indirect, draw_indexed_indirect, dispatch, dispatch_indirect,
     copy_buffer, copy_buffer_to_texture, copy_texture_to_buffer, copy_texture, fill_buffer, clear_texture,
-    clear_depth_stencil, generate_mips,
+    clear_depth_stencil, generate_mips, build_acceleration_structure,
     write_timestamp, begin_occlusion_query, end_occlusion_query,
     push_debug_group, pop_debug_group, begin_statement, end_statement,
 };
@@ -196,6 +198,33 @@ struct ClearDepthStencilCommand {
 struct GenerateMipsCommand {
     static constexpr CommandType type = CommandType::generate_mips;
     TextureReference texture;
+};
+/// A geometry of a bottom level; objects are null where the geometry is empty or has no indices.
+struct GeometrySourceCommand {
+    BufferReference vertices, indices;
+    std::uint64_t vertex_offset, index_offset;
+};
+/// An instance of a top level; the object is null where it has none.
+struct InstanceCommand {
+    AccelerationStructureReference bottom_level;
+    std::array<float, 12> transform;
+    std::uint32_t custom_index, table_offset, mask;
+    InstanceFlags flags;
+};
+/// Followed by `count` GeometrySourceCommand for bottom levels, InstanceCommand for top levels.
+struct BuildAccelerationStructureCommand {
+    static constexpr CommandType type = CommandType::build_acceleration_structure;
+    AccelerationStructureReference structure;
+    std::uint32_t count;
+    bool is_top, is_update;
+    [[nodiscard]] GeometrySourceCommand* sources() { return reinterpret_cast<GeometrySourceCommand*>(this + 1); }
+    [[nodiscard]] const GeometrySourceCommand* sources() const {
+        return reinterpret_cast<const GeometrySourceCommand*>(this + 1);
+    }
+    [[nodiscard]] InstanceCommand* instances() { return reinterpret_cast<InstanceCommand*>(this + 1); }
+    [[nodiscard]] const InstanceCommand* instances() const {
+        return reinterpret_cast<const InstanceCommand*>(this + 1);
+    }
 };
 struct WriteTimestampCommand {
     static constexpr CommandType type = CommandType::write_timestamp;

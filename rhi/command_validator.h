@@ -46,6 +46,8 @@ class CommandValidator {
     Check fill_buffer(Buffer buffer, std::uint64_t offset, std::uint64_t size);
     Check clear(const TextureView& view, bool depth);
     Check generate_mips(Texture texture);
+    /// The command with its handles.
+    Check build_acceleration_structure(const BuildAccelerationStructureCommand& command);
     Check write_timestamp(QueryPool pool, std::uint32_t index);
     Check begin_occlusion_query(QueryPool pool, std::uint32_t index);
     Check end_occlusion_query(QueryPool pool, std::uint32_t index);
@@ -97,6 +99,8 @@ class CommandValidator {
     Check check_indirect(const char* attempted, Buffer arguments, std::uint64_t offset, std::uint32_t count,
                          std::uint32_t stride, std::uint32_t bytes);
     Check check_query(const char* attempted, QueryPool pool, std::uint32_t index, QueryType type);
+    Check check_geometry_source(const char* attempted, const AccelerationStructureDesc& structure, std::size_t index,
+                                const GeometrySourceCommand& source);
     Check check_texture_box(const char* attempted, const TextureDesc& desc, std::uint32_t mip, std::uint32_t layer,
                             std::uint32_t layer_count, const Offset3D& offset, const Extent3D& extent) const;
 

@@ -147,6 +147,11 @@ MemoryStatistics Device::memory_statistics() const {
         [&](const BufferObject& buffer) { statistics.buffer_bytes += buffer.backend->memory_bytes; });
     device.tables().textures.for_each(
         [&](const TextureObject& texture) { statistics.texture_bytes += texture.backend->memory_bytes; });
+    statistics.acceleration_structure_bytes = 0;
+    statistics.acceleration_structure_count = device.tables().acceleration_structures.size();
+    device.tables().acceleration_structures.for_each([&](const AccelerationStructureObject& structure) {
+        statistics.acceleration_structure_bytes += structure.backend->memory_bytes;
+    });
     for (const StagingChunk& chunk : device.staging) statistics.staging_bytes += chunk.buffer->desc.size;
     return statistics;
 }

@@ -133,6 +133,7 @@ class Device {
     Expected<GraphicsPipeline> create_graphics_pipeline(const GraphicsPipelineDesc& desc);
     Expected<ComputePipeline> create_compute_pipeline(const ComputePipelineDesc& desc);
     Expected<QueryPool> create_query_pool(const QueryPoolDesc& desc);
+    Expected<AccelerationStructure> create_acceleration_structure(const AccelerationStructureDesc& desc);
 
     /// Destroys an object once the device no longer uses it. An empty handle is ignored; destroying twice is an error that
     /// is reported to the message callback.
@@ -144,10 +145,13 @@ class Device {
     void destroy(GraphicsPipeline object);
     void destroy(ComputePipeline object);
     void destroy(QueryPool object);
+    /// A top level keeps none of its bottom levels alive: they are destroyed after its last use.
+    void destroy(AccelerationStructure object);
 
     // What objects are. A stale handle gives an error.
     Expected<BufferDesc> describe(Buffer object) const;
     Expected<TextureDesc> describe(Texture object) const;
+    Expected<AccelerationStructureDesc> describe(AccelerationStructure object) const;
     Expected<ShaderReflection> reflection(Shader object) const;
     /// The layout that a pipeline expects at a bind-group index (empty layouts included).
     Expected<BindGroupLayout> bind_group_layout(GraphicsPipeline pipeline, std::uint32_t index) const;

@@ -34,6 +34,7 @@ ResourceUse use_of(BindingType type) {
         case BindingType::writeonly_storage_image: return ResourceUse::storage_write;
         case BindingType::sampled_texture:
         case BindingType::combined_texture_sampler: return ResourceUse::sampled;
+        case BindingType::acceleration_structure: return ResourceUse::acceleration_structure_read;
         case BindingType::sampler: break;
     }
     return ResourceUse::none;
@@ -88,16 +89,19 @@ Check GroupBuilder::add(const BindGroupEntry& entry) {
                        "Correct BindGroupEntry::element.");
     const bool wrong = (static_cast<bool>(entry.buffer) != is_buffer(binding.type)) ||
                        (static_cast<bool>(entry.texture.texture) != has_texture(binding.type)) ||
-                       (static_cast<bool>(entry.sampler) != has_sampler(binding.type));
+                       (static_cast<bool>(entry.sampler) != has_sampler(binding.type)) ||
+                       (static_cast<bool>(entry.acceleration_structure) !=
+                        (binding.type == BindingType::acceleration_structure));
     if (wrong) {
         std::string found;
         if (entry.buffer) found += " buffer";
         if (entry.texture.texture) found += " texture";
         if (entry.sampler) found += " sampler";
+        if (entry.acceleration_structure) found += " acceleration structure";
         return problem(
             Rule::group_wrong_resource, entry.binding,
             fmt::format("expected what a {} needs, found{}", name_of(binding.type), found.empty() ? " nothing" : found),
-            "Set buffer, texture or sampler of the entry as the binding's type needs them.");
+            "Set buffer, texture, sampler or acceleration structure of the entry as the binding's type needs them.");
     }
     BackendBinding resolved;
     resolved.binding = entry.binding;
@@ -115,6 +119,19 @@ Check GroupBuilder::add(const BindGroupEntry& entry) {
     }
     if (entry.texture.texture)
         if (Check failed = add_texture(entry, binding, resolved, sampler_desc)) return failed;
+    if (entry.acceleration_structure) {
+        auto* slot = tables_.acceleration_structures.find_slot(entry.acceleration_structure);
+        if (!slot)
+            return handle_problem(tables_.acceleration_structures, entry.acceleration_structure, "create bind group",
+                                  "acceleration structure");
+        if (slot->object.desc.level != AccelerationStructureLevel::top)
+            return problem(Rule::group_acceleration_structure_level, entry.binding,
+                           fmt::format("expected a top level, found the bottom level '{}'", slot->object.desc.name),
+                           "Build a top level with an instance of it, and bind that.");
+        resolved.acceleration_structure = slot->object.backend.get();
+        object.acceleration_structures.push_back(
+            {slot, slot->generation, entry.binding, {use_of(binding.type), binding.stages}});
+    }
     bindings.push_back(resolved);
     return {};
 }

@@ -34,6 +34,7 @@ const std::string& name_of_object(const BindGroupObject& object) { return object
 const std::string& name_of_object(const GraphicsPipelineObject& object) { return object.common.name; }
 const std::string& name_of_object(const ComputePipelineObject& object) { return object.common.name; }
 const std::string& name_of_object(const QueryPoolObject& object) { return object.desc.name; }
+const std::string& name_of_object(const AccelerationStructureObject& object) { return object.desc.name; }
 
 /// A shader lives on in the pipelines that were made from it.
 class SharedShader : public BackendObject {
@@ -210,6 +211,31 @@ Expected<QueryPool> Device::create_query_pool(const QueryPoolDesc& desc) {
     return insert(device, QueryPool{}, std::move(object), "create query pool");
 }
 
+Expected<std::unique_ptr<BackendAccelerationStructure>> BackendDevice::create_acceleration_structure(
+    const AccelerationStructureDesc& desc) {
+    return fail(ErrorCode::unsupported, "create acceleration structure", "'" + desc.name + "'",
+                "this backend has no acceleration structures", "Ask Capabilities::ray_query first.");
+}
+
+Expected<AccelerationStructure> Device::create_acceleration_structure(const AccelerationStructureDesc& desc) {
+    DeviceState& device = *state_;
+    if (device.lost) return device.lost_error("create acceleration structure", "'" + desc.name + "'");
+    if (Check failed = check_acceleration_structure(desc, device.capabilities()))
+        return device.reject(std::move(*failed));
+    const std::lock_guard lock(device.mutex);
+    device.collect();
+    auto made = device.backend->create_acceleration_structure(desc);
+    if (!made) return backend_failure(device, made);
+    AccelerationStructureObject object;
+    object.backend = std::move(*made);
+    object.backend->desc = desc;
+    object.desc = desc;
+    NACRE_TRY(const AccelerationStructure handle,
+              insert(device, AccelerationStructure{}, std::move(object), "create acceleration structure"));
+    device.tables().acceleration_structures.find(handle)->handle = handle;
+    return handle;
+}
+
 void Device::destroy(Buffer object) { destroy_object(*state_, object, "destroy", "buffer", true); }
 void Device::destroy(Texture object) { destroy_object(*state_, object, "destroy", "texture", true); }
 void Device::destroy(Sampler object) { destroy_object(*state_, object, "destroy", "sampler", true); }
@@ -220,6 +246,9 @@ void Device::destroy(GraphicsPipeline object) {
 }
 void Device::destroy(ComputePipeline object) { destroy_object(*state_, object, "destroy", "compute pipeline", false); }
 void Device::destroy(QueryPool object) { destroy_object(*state_, object, "destroy", "query pool", false); }
+void Device::destroy(AccelerationStructure object) {
+    destroy_object(*state_, object, "destroy", "acceleration structure", true);
+}
 
 Expected<BufferDesc> Device::describe(Buffer object) const {
     const std::shared_lock lock(state_->shared->tables_mutex);
@@ -230,6 +259,13 @@ Expected<BufferDesc> Device::describe(Buffer object) const {
 Expected<TextureDesc> Device::describe(Texture object) const {
     const std::shared_lock lock(state_->shared->tables_mutex);
     NACRE_TRY(const TextureObject* found, described(*state_, object, "describe", "texture"));
+    return found->desc;
+}
+
+Expected<AccelerationStructureDesc> Device::describe(AccelerationStructure object) const {
+    const std::shared_lock lock(state_->shared->tables_mutex);
+    NACRE_TRY(const AccelerationStructureObject* found,
+              described(*state_, object, "describe", "acceleration structure"));
     return found->desc;
 }
 

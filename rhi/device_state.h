@@ -66,7 +66,8 @@ struct ObjectTables {
           groups(device),
           graphics_pipelines(device),
           compute_pipelines(device),
-          query_pools(device) {}
+          query_pools(device),
+          acceleration_structures(device) {}
     SlotTable<Buffer, BufferObject> buffers;
     SlotTable<Texture, TextureObject> textures;
     SlotTable<Sampler, SamplerObject> samplers;
@@ -76,6 +77,7 @@ struct ObjectTables {
     SlotTable<GraphicsPipeline, GraphicsPipelineObject> graphics_pipelines;
     SlotTable<ComputePipeline, ComputePipelineObject> compute_pipelines;
     SlotTable<QueryPool, QueryPoolObject> query_pools;
+    SlotTable<AccelerationStructure, AccelerationStructureObject> acceleration_structures;
 
     /// Frees all objects, users of others before what they use.
     void clear() {
@@ -87,6 +89,7 @@ struct ObjectTables {
         shaders = SlotTable<Shader, ShaderObject>(device);
         query_pools = SlotTable<QueryPool, QueryPoolObject>(device);
         samplers = SlotTable<Sampler, SamplerObject>(device);
+        acceleration_structures = SlotTable<AccelerationStructure, AccelerationStructureObject>(device);
         textures = SlotTable<Texture, TextureObject>(device);
         buffers = SlotTable<Buffer, BufferObject>(device);
     }
@@ -100,6 +103,7 @@ struct ObjectTables {
     auto& table(GraphicsPipeline) { return graphics_pipelines; }
     auto& table(ComputePipeline) { return compute_pipelines; }
     auto& table(QueryPool) { return query_pools; }
+    auto& table(AccelerationStructure) { return acceleration_structures; }
 };
 
 /// The part of a device that command lists share, and that outlives it where they do.

@@ -34,6 +34,7 @@ using BindGroup = Handle<struct BindGroupTag>;
 using GraphicsPipeline = Handle<struct GraphicsPipelineTag>;
 using ComputePipeline = Handle<struct ComputePipelineTag>;
 using QueryPool = Handle<struct QueryPoolTag>;
+using AccelerationStructure = Handle<struct AccelerationStructureTag>;
 
 /// Bitwise operators for an `enum class` of flags in this namespace.
 #define NACRE_FLAGS(Type)                                                                                        \

@@ -18,8 +18,9 @@ std::string quoted(std::string_view kind, const std::string& name) { return fmt:
 }  // namespace
 
 std::string text_of(BufferUsage usage) {
-    static constexpr std::array<std::string_view, 7> names{"vertex",   "index",       "uniform",         "storage",
-                                                           "indirect", "copy_source", "copy_destination"};
+    static constexpr std::array<std::string_view, 8> names{
+        "vertex", "index", "uniform", "storage", "indirect", "copy_source", "copy_destination",
+        "acceleration_structure_input"};
     std::string text;
     for (std::size_t i = 0; i < names.size(); ++i)
         if (static_cast<std::uint32_t>(usage) >> i & 1) text += (text.empty() ? "" : " | ") + std::string(names[i]);
@@ -46,6 +47,7 @@ std::string_view name_of(BindingType type) {
         case BindingType::storage_image: return "storage_image";
         case BindingType::readonly_storage_image: return "readonly_storage_image";
         case BindingType::writeonly_storage_image: return "writeonly_storage_image";
+        case BindingType::acceleration_structure: return "acceleration_structure";
     }
     return "unknown";
 }
@@ -80,6 +82,10 @@ Check check_buffer(const BufferDesc& desc, const Capabilities& capabilities) {
     if (desc.usage == BufferUsage::none)
         return problem(Rule::buffer_usage, ErrorCode::invalid_argument, "expected at least one usage, found none",
                        "State in BufferDesc::usage what the buffer is for.");
+    if (has_any(desc.usage, BufferUsage::acceleration_structure_input) && !capabilities.ray_query)
+        return problem(Rule::buffer_usage, ErrorCode::unsupported,
+                       "expected no acceleration_structure_input on a device without ray_query, found it asked for",
+                       "Ask Capabilities::ray_query first.");
     constexpr BufferUsage copies = BufferUsage::copy_source | BufferUsage::copy_destination;
     if (desc.memory == MemoryKind::readback && has_any(desc.usage, ~copies))
         return problem(Rule::buffer_usage, ErrorCode::invalid_argument,
@@ -271,6 +277,60 @@ Check check_query_pool(const QueryPoolDesc& desc, const Capabilities& capabiliti
     return {};
 }
 
+Check check_acceleration_structure(const AccelerationStructureDesc& desc, const Capabilities& capabilities) {
+    const auto problem = [&](Rule rule, ErrorCode code, std::string reason, std::string remedy) {
+        return Problem{rule, code, "create acceleration structure", "'" + desc.name + "'", std::move(reason),
+                       std::move(remedy)};
+    };
+    if (!capabilities.ray_query)
+        return problem(Rule::acceleration_structure_unsupported, ErrorCode::unsupported,
+                       "expected a device with ray queries (ray_query), found one without",
+                       "Ask Capabilities::ray_query first.");
+    const bool is_top = desc.level == AccelerationStructureLevel::top;
+    if (is_top != desc.geometries.empty() || is_top != (desc.max_instances > 0) ||
+        desc.max_instances > max_structure_instances || desc.geometries.size() > max_structure_geometries)
+        return problem(Rule::acceleration_structure_level, ErrorCode::invalid_argument,
+                       is_top ? fmt::format("expected a top level of 1 to {} instances and no geometry, found {} and {}",
+                                            max_structure_instances, desc.max_instances, desc.geometries.size())
+                              : fmt::format("expected a bottom level of 1 to {} geometries and no instances, found {} and {}",
+                                            max_structure_geometries, desc.geometries.size(), desc.max_instances),
+                       "Put geometry into bottom levels, and instances of them into top levels.");
+    std::uint64_t primitives = 0;
+    for (std::size_t i = 0; i < desc.geometries.size(); ++i) {
+        const GeometryDesc& geometry = desc.geometries[i];
+        const auto wrong = [&](std::string reason, std::string remedy) {
+            return problem(Rule::acceleration_structure_geometry, ErrorCode::invalid_argument,
+                           fmt::format("geometry {}: {}", i, reason), std::move(remedy));
+        };
+        if (geometry.type != GeometryType::triangles)
+            return problem(Rule::acceleration_structure_unsupported, ErrorCode::unsupported,
+                           fmt::format("geometry {}: expected triangles, found {}", i,
+                                       geometry.type == GeometryType::boxes ? "boxes" : "curves"),
+                           "Use triangles; no device has other geometry yet.");
+        if (geometry.vertex_format != Format::rgb32_float)
+            return wrong(fmt::format("expected vertices of format {}, found {}", info(Format::rgb32_float).name,
+                                     info(geometry.vertex_format).name),
+                         "Store positions as three floats.");
+        if (geometry.vertex_stride < 12 || geometry.vertex_stride > 65536 || geometry.vertex_stride % 4 != 0)
+            return wrong(fmt::format("expected a stride of 12 to 65536 bytes that is a multiple of 4, found {}",
+                                     geometry.vertex_stride),
+                         "Correct GeometryDesc::vertex_stride.");
+        if (geometry.vertex_count == 0 && geometry.primitive_count != 0)
+            return wrong(fmt::format("expected vertices for {} triangles, found none", geometry.primitive_count),
+                         "Set GeometryDesc::vertex_count.");
+        if (!geometry.index_type && geometry.vertex_count / 3 < geometry.primitive_count)
+            return wrong(fmt::format("expected three vertices for each of {} triangles without indices, found {}",
+                                     geometry.primitive_count, geometry.vertex_count),
+                         "Correct the counts, or set GeometryDesc::index_type.");
+        primitives += geometry.primitive_count;
+        if (primitives > max_structure_primitives || geometry.vertex_count > max_structure_primitives)
+            return wrong(fmt::format("expected at most {} triangles and vertices in all, found more",
+                                     max_structure_primitives),
+                         "Split the mesh over several bottom levels.");
+    }
+    return {};
+}
+
 Check check_view(const ViewReference& view, const TextureDesc& desc, const Capabilities& capabilities,
                  const char* attempted, const std::string& subject) {
     const auto problem = [&](Rule rule, std::string reason, std::string remedy) {
@@ -368,6 +428,11 @@ Check check_layout(const BindGroupLayoutDesc& desc, const Capabilities& capabili
                     "Use TextureTable, which works on every device, or give a count.");
         }
     }
+    for (const BindingLayout& binding : desc.bindings)
+        if (binding.type == BindingType::acceleration_structure && !capabilities.ray_query)
+            return problem(Rule::acceleration_structure_unsupported, ErrorCode::unsupported, binding,
+                           "expected no acceleration structure on a device without ray_query, found one",
+                           "Ask Capabilities::ray_query first.");
     const BindGroupLayoutDesc* one = &desc;
     return check_stage_limits(std::span(&one, 1), capabilities, "create bind group layout", "'" + desc.name + "'");
 }
@@ -393,6 +458,7 @@ Check check_stage_limits(std::span<const BindGroupLayoutDesc* const> layouts, co
                     case BindingType::storage_image:
                     case BindingType::readonly_storage_image:
                     case BindingType::writeonly_storage_image: counts[4] += binding.count; break;
+                    case BindingType::acceleration_structure: break;
                 }
             }
         const std::array<std::pair<std::string_view, std::uint32_t>, 5> limits{{

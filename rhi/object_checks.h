@@ -19,6 +19,7 @@ Check check_buffer(const BufferDesc& desc, const Capabilities& capabilities);
 Check check_texture(const TextureDesc& desc, const Capabilities& capabilities);
 Check check_sampler(const SamplerDesc& desc, const Capabilities& capabilities);
 Check check_query_pool(const QueryPoolDesc& desc, const Capabilities& capabilities);
+Check check_acceleration_structure(const AccelerationStructureDesc& desc, const Capabilities& capabilities);
 /// `bindings` sorted by number.
 Check check_layout(const BindGroupLayoutDesc& desc, const Capabilities& capabilities);
 Check check_shader(const ShaderReflection& reflection, const std::string& name, const Capabilities& capabilities);

@@ -60,6 +60,33 @@ struct TextureObject {
     std::uint64_t saved_epoch = 0;
 };
 
+struct AccelerationStructureObject {
+    std::unique_ptr<BackendAccelerationStructure> backend;
+    AccelerationStructureDesc desc;
+    AccelerationStructure handle;
+
+    /// Of one bottom level that a top level was built over.
+    struct BottomLevel {
+        SlotTable<AccelerationStructure, AccelerationStructureObject>::Slot* slot = nullptr;
+        std::uint32_t generation = 0;
+        std::uint64_t builds = 0;  ///< That it had then.
+    };
+    /// Content as of the last submission.
+    struct Content {
+        std::uint64_t builds = 0;  ///< Number of builds and updates; 0: none.
+        std::uint32_t count = 0;   ///< Geometries or instances.
+        std::vector<BottomLevel> bottom_levels{};
+    };
+    Content content{}, saved_content{};
+
+    // Kept by StateTracker.
+    ResourceState state{};
+    ResourceState scope_state{};
+    std::uint64_t scope_epoch = 0;
+    ResourceState saved_state{};
+    std::uint64_t saved_epoch = 0;
+};
+
 struct SamplerObject {
     std::unique_ptr<BackendSampler> backend;
     SamplerDesc desc;
@@ -100,6 +127,13 @@ struct SamplerUse {
     std::uint32_t binding = 0;
 };
 
+struct AccelerationStructureUse {
+    SlotTable<AccelerationStructure, AccelerationStructureObject>::Slot* slot = nullptr;
+    std::uint32_t generation = 0;
+    std::uint32_t binding = 0;
+    ResourceState state{};
+};
+
 struct BindGroupObject {
     std::unique_ptr<BackendBindGroup> backend;
     BindGroupLayout layout;
@@ -107,6 +141,7 @@ struct BindGroupObject {
     std::vector<BufferUse> buffers;
     std::vector<TextureUse> textures;
     std::vector<SamplerUse> samplers;
+    std::vector<AccelerationStructureUse> acceleration_structures;
     std::uint64_t merged_epoch = 0;   ///< Scope into which its uses were merged last.
     std::uint64_t checked_epoch = 0;  ///< Count of destructions at which its resources were known to live.
 };

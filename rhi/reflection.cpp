@@ -467,6 +467,10 @@ class Reflector {
             binding.type = BindingType::sampler;
             return {};
         }
+        if (Module::is(type, spv::Op::OpTypeAccelerationStructureKHR)) {
+            binding.type = BindingType::acceleration_structure;
+            return {};
+        }
         const bool is_combined = Module::is(type, spv::Op::OpTypeSampledImage);
         const auto image = is_combined ? module_.find(type.operand(1), spv::Op::OpTypeImage)
                                        : module_.find(type.operand(0), spv::Op::OpTypeImage);

@@ -29,6 +29,7 @@ struct Offset3D {
 
 enum class BufferUsage : std::uint32_t {
     none = 0, vertex = 1, index = 2, uniform = 4, storage = 8, indirect = 16, copy_source = 32, copy_destination = 64,
+    acceleration_structure_input = 128,  ///< Vertices and indices that acceleration structures are built from.
 };
 NACRE_FLAGS(BufferUsage)
 
@@ -136,6 +137,7 @@ enum class BindingType : std::uint8_t {
     storage_image,             ///< Read and write.
     readonly_storage_image,
     writeonly_storage_image,
+    acceleration_structure,    ///< accelerationStructureEXT; a top level.
 };
 
 struct BindingLayout {
@@ -161,6 +163,7 @@ struct BindGroupEntry {
     std::uint64_t size = ~0ull;  ///< Bytes; default: to the end of the buffer.
     TextureView texture{};
     Sampler sampler{};
+    AccelerationStructure acceleration_structure{};
     std::uint32_t element = 0;   ///< Index into an arrayed binding.
 };
 
@@ -183,10 +186,12 @@ struct QueryPoolDesc {
 struct MemoryStatistics {
     std::uint64_t buffer_bytes = 0;
     std::uint64_t texture_bytes = 0;
+    std::uint64_t acceleration_structure_bytes = 0;  ///< With what their last builds took and kept.
     std::uint64_t reserved_bytes = 0;     ///< Taken from the driver, including free parts of blocks.
     std::uint64_t staging_bytes = 0;      ///< Held by the RHI itself for uploads and read-backs.
     std::uint32_t buffer_count = 0;
     std::uint32_t texture_count = 0;
+    std::uint32_t acceleration_structure_count = 0;
     std::uint32_t driver_allocations = 0; ///< Blocks taken from the driver.
 };
 

@@ -129,7 +129,7 @@ std::unexpected<Error> rejected(const GlslInput& input, const Includer& includer
 }
 
 Expected<std::vector<std::uint32_t>> optimize(std::vector<std::uint32_t> words, const std::string& path) {
-    spvtools::Optimizer optimizer(SPV_ENV_VULKAN_1_1);
+    spvtools::Optimizer optimizer(words[1] > 0x10300 ? SPV_ENV_VULKAN_1_1_SPIRV_1_4 : SPV_ENV_VULKAN_1_1);
     std::string log;
     optimizer.SetMessageConsumer([&](spv_message_level_t, const char*, const spv_position_t& position,
                                      const char* message) { log += fmt::format("{}: {}\n", position.index, message); });
@@ -145,16 +145,9 @@ Expected<std::vector<std::uint32_t>> optimize(std::vector<std::uint32_t> words, 
     return optimized;
 }
 
-}  // namespace
-
-const std::string& glsl_compiler_version() {
-    static const std::string version =
-        fmt::format("form 2, glslang {}, {}", glslang_version, spvSoftwareVersionDetailsString());
-    return version;
-}
-
-Expected<std::vector<std::uint32_t>> compile_glsl(const GlslInput& input) {
-    initialize_glslang();
+/// @param asks_for_rays  set where the shader requests GL_EXT_ray_query
+Expected<std::vector<std::uint32_t>> compile_for(const GlslInput& input, glslang::EShTargetLanguageVersion target,
+                                                 bool& asks_for_rays) {
     const EShLanguage language = language_of(input.stage);
     const GlslFile& main_file = input.files.at(input.path);
 
@@ -167,10 +160,9 @@ Expected<std::vector<std::uint32_t>> compile_glsl(const GlslInput& input) {
     shader.setPreamble(preamble.c_str());
     shader.setEntryPoint("main");
     shader.setSourceEntryPoint("main");
-    // SPIR-V 1.3 is the newest that all consumers take: Vulkan 1.1 drivers, SPIRV-Cross of Debian 12.
     shader.setEnvInput(glslang::EShSourceGlsl, language, glslang::EShClientVulkan, 100);
     shader.setEnvClient(glslang::EShClientVulkan, glslang::EShTargetVulkan_1_1);
-    shader.setEnvTarget(glslang::EShTargetSpv, glslang::EShTargetSpv_1_3);
+    shader.setEnvTarget(glslang::EShTargetSpv, target);
     // Not TShader::setDebugInfo: it is for NonSemantic.Shader.DebugInfo alone, and without that glslang 12.0 writes
     // invalid modules for every block in braces. SpvOptions::generateDebugInfo is all that line tables need.
 
@@ -181,6 +173,8 @@ Expected<std::vector<std::uint32_t>> compile_glsl(const GlslInput& input) {
     constexpr int default_version = 460;
     if (!shader.parse(GetDefaultResources(), default_version, ECoreProfile, false, false, messages, includer))
         return rejected(input, includer, readable_log(shader.getInfoLog(), input.path));
+    asks_for_rays = shader.getIntermediate()->getRequestedExtensions().contains("GL_EXT_ray_query");
+    if (asks_for_rays && target < glslang::EShTargetSpv_1_4) return std::vector<std::uint32_t>();
     if (const std::string log = readable_log(shader.getInfoLog(), input.path); !log.empty())
         log_message(LogLevel::debug, log);
 
@@ -199,6 +193,24 @@ Expected<std::vector<std::uint32_t>> compile_glsl(const GlslInput& input) {
         return fail(ErrorCode::shader_compile, std::string(action), fmt::format("'{}'", input.path),
                     fmt::format("no SPIR-V came out: {}", logger.getAllMessages()));
     return input.optimize ? optimize(std::move(words), input.path) : std::move(words);
+}
+
+}  // namespace
+
+const std::string& glsl_compiler_version() {
+    static const std::string version =
+        fmt::format("form 3, glslang {}, {}", glslang_version, spvSoftwareVersionDetailsString());
+    return version;
+}
+
+Expected<std::vector<std::uint32_t>> compile_glsl(const GlslInput& input) {
+    initialize_glslang();
+    // SPIR-V 1.3 is the newest that all consumers take: Vulkan 1.1 drivers, SPIRV-Cross of Debian 12. Ray queries need
+    // 1.4, which every device that has them takes; whether a shader asks for them is known once it was read.
+    bool asks_for_rays = false;
+    auto words = compile_for(input, glslang::EShTargetSpv_1_3, asks_for_rays);
+    if (!asks_for_rays) return words;
+    return compile_for(input, glslang::EShTargetSpv_1_4, asks_for_rays);
 }
 
 }  // namespace nacre::rhi

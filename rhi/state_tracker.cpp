@@ -58,6 +58,7 @@ void StateTracker::begin_submission() {
     submission_epoch_ = ++epoch_;
     touched_buffers_.clear();
     touched_textures_.clear();
+    touched_structures_.clear();
     batches_.clear();
     barriers_.clear();
 }
@@ -68,6 +69,10 @@ void StateTracker::rollback() {
         texture->state = texture->saved_state;
         texture->states = texture->saved_states;
     }
+    for (AccelerationStructureObject* structure : touched_structures_) {
+        structure->state = structure->saved_state;
+        structure->content = structure->saved_content;
+    }
     begin_submission();
 }
 
@@ -75,6 +80,7 @@ void StateTracker::begin_scope() {
     ++epoch_;
     scope_buffers_.clear();
     scope_textures_.clear();
+    scope_structures_.clear();
 }
 
 void StateTracker::save(BufferObject& buffer) {
@@ -90,6 +96,26 @@ void StateTracker::save(TextureObject& texture) {
     texture.saved_state = texture.state;
     texture.saved_states = texture.states;
     touched_textures_.push_back(&texture);
+}
+
+void StateTracker::save(AccelerationStructureObject& structure) {
+    if (structure.saved_epoch == submission_epoch_) return;
+    structure.saved_epoch = submission_epoch_;
+    structure.saved_state = structure.state;
+    structure.saved_content = structure.content;
+    touched_structures_.push_back(&structure);
+}
+
+bool StateTracker::use(AccelerationStructureObject& structure, ResourceState state) {
+    if (structure.scope_epoch != epoch_) {
+        structure.scope_epoch = epoch_;
+        structure.scope_state = state;
+        scope_structures_.push_back(&structure);
+        return true;
+    }
+    structure.scope_state = merge(structure.scope_state, state);
+    // A build writes one structure and reads others; nothing else writes any.
+    return !writes(structure.scope_state) || structure.scope_state.use == state.use;
 }
 
 bool StateTracker::use(BufferObject& buffer, ResourceState state) {
@@ -159,6 +185,19 @@ void StateTracker::transition(BufferObject& buffer) {
         barriers_.push_back(barrier);
     }
     buffer.state = next.after;
+}
+
+void StateTracker::transition(AccelerationStructureObject& structure) {
+    const Step next = step(structure.state, structure.scope_state, false);
+    save(structure);
+    if (next.barrier) {
+        Barrier barrier;
+        barrier.acceleration_structure = structure.backend.get();
+        barrier.before = structure.state;
+        barrier.after = next.after;
+        barriers_.push_back(barrier);
+    }
+    structure.state = next.after;
 }
 
 void StateTracker::transition(TextureObject& texture) {
@@ -243,6 +282,7 @@ void StateTracker::end_scope(const CommandHeader* before) {
     const std::size_t first = barriers_.size();
     for (BufferObject* buffer : scope_buffers_) transition(*buffer);
     for (TextureObject* texture : scope_textures_) transition(*texture);
+    for (AccelerationStructureObject* structure : scope_structures_) transition(*structure);
     if (barriers_.size() == first) return;
     batches_.push_back(
         {before, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(barriers_.size() - first)});
@@ -259,10 +299,11 @@ void StateTracker::add_barrier(const CommandHeader* before, BackendBuffer& buffe
 }
 
 std::string text_of(ResourceUse use) {
-    static constexpr std::array<std::string_view, 15> names{
+    static constexpr std::array<std::string_view, 18> names{
         "vertex_buffer", "index_buffer",     "indirect_argument", "uniform_buffer",      "sampled",
         "storage_read",  "storage_write",    "color_target",      "depth_stencil_write", "depth_stencil_read",
-        "copy_source",   "copy_destination", "resolve_source",    "resolve_destination", "host_read"};
+        "copy_source",   "copy_destination", "resolve_source",    "resolve_destination", "host_read",
+        "build_input",   "acceleration_structure_read", "acceleration_structure_write"};
     std::string text;
     for (std::size_t i = 0; i < names.size(); ++i)
         if (static_cast<std::uint32_t>(use) >> i & 1) text += (text.empty() ? "" : " | ") + std::string(names[i]);

@@ -28,6 +28,7 @@ class StateTracker {
     void begin_scope();
     /// Adds a use to the current scope. False where it contradicts another use of the scope.
     bool use(BufferObject& buffer, ResourceState state);
+    bool use(AccelerationStructureObject& structure, ResourceState state);
     bool use(TextureObject& texture, const SubresourceRange& range, ResourceState state, bool discard = false);
     /// Ends the scope: emits the barriers that it needs before the given command (null: at the end of the submission).
     void end_scope(const CommandHeader* before);
@@ -40,6 +41,7 @@ class StateTracker {
     /// What the current scope has touched so far.
     [[nodiscard]] const std::vector<BufferObject*>& scope_buffers() const { return scope_buffers_; }
     [[nodiscard]] const std::vector<TextureObject*>& scope_textures() const { return scope_textures_; }
+    [[nodiscard]] const std::vector<AccelerationStructureObject*>& scope_structures() const { return scope_structures_; }
     /// All that the submission has changed the state of.
     [[nodiscard]] const std::vector<BufferObject*>& touched_buffers() const { return touched_buffers_; }
     [[nodiscard]] const std::vector<TextureObject*>& touched_textures() const { return touched_textures_; }
@@ -50,13 +52,16 @@ class StateTracker {
   private:
     void save(BufferObject& buffer);
     void save(TextureObject& texture);
+    void save(AccelerationStructureObject& structure);
     void transition(BufferObject& buffer);
+    void transition(AccelerationStructureObject& structure);
     void transition(TextureObject& texture);
 
     std::uint64_t epoch_ = 1;
     std::uint64_t submission_epoch_ = 0;
     std::vector<BufferObject*> scope_buffers_, touched_buffers_;
     std::vector<TextureObject*> scope_textures_, touched_textures_;
+    std::vector<AccelerationStructureObject*> scope_structures_, touched_structures_;
     std::vector<BarrierBatch> batches_;
     std::vector<Barrier> barriers_;
 };

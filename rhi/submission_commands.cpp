@@ -274,6 +274,9 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
             return copy_scope(header);
         }
 
+        case CommandType::build_acceleration_structure:
+            return build(header, as(std::type_identity<BuildAccelerationStructureCommand>{}));
+
         case CommandType::write_timestamp:
         case CommandType::begin_occlusion_query:
         case CommandType::end_occlusion_query: {

@@ -7,26 +7,35 @@ namespace nacre::rhi {
 void SubmissionWalk::note_statement() {
     if (!in_statement_ || !device_.shared->desc.verify_statements) return;
     for (const BufferObject* buffer : tracker_.scope_buffers())
-        actual_[{false, buffer->handle.index}] |= buffer->scope_state.use;
+        actual_[{ResourceKind::buffer, buffer->handle.index}] |= buffer->scope_state.use;
     for (const TextureObject* texture : tracker_.scope_textures()) {
         ResourceUse use = texture->scope_state.use;
         for (const ResourceState& part : texture->scope_states) use |= part.use;
-        actual_[{true, texture->handle.index}] |= use;
+        actual_[{ResourceKind::texture, texture->handle.index}] |= use;
     }
+    for (const AccelerationStructureObject* structure : tracker_.scope_structures())
+        actual_[{ResourceKind::acceleration_structure, structure->handle.index}] |= structure->scope_state.use;
 }
 
 void SubmissionWalk::end_statement() {
     if (!device_.shared->desc.verify_statements) return;
-    std::map<std::pair<bool, std::uint64_t>, ResourceUse> stated;
+    std::map<ResourceKey, ResourceUse> stated;
     for (const StatedAccess& access : stated_) {
-        if (access.buffer) stated[{false, access.buffer.index}] |= access.use;
-        if (access.texture) stated[{true, access.texture.index}] |= access.use;
+        if (access.buffer) stated[{ResourceKind::buffer, access.buffer.index}] |= access.use;
+        if (access.texture) stated[{ResourceKind::texture, access.texture.index}] |= access.use;
+        if (access.acceleration_structure)
+            stated[{ResourceKind::acceleration_structure, access.acceleration_structure.index}] |= access.use;
     }
-    const auto name_of_resource = [&](std::pair<bool, std::uint64_t> key) -> std::string {
+    const auto name_of_resource = [&](ResourceKey key) -> std::string {
         std::string name;
-        if (key.first)
+        if (key.first == ResourceKind::texture)
             tables_.textures.for_each([&](TextureObject& texture) {
                 if (texture.handle.index == key.second) name = "texture '" + texture.desc.name + "'";
+            });
+        else if (key.first == ResourceKind::acceleration_structure)
+            tables_.acceleration_structures.for_each([&](AccelerationStructureObject& structure) {
+                if (structure.handle.index == key.second)
+                    name = "acceleration structure '" + structure.desc.name + "'";
             });
         else
             tables_.buffers.for_each([&](BufferObject& buffer) {
@@ -34,7 +43,7 @@ void SubmissionWalk::end_statement() {
             });
         return name.empty() ? "a destroyed resource" : name;
     };
-    const auto tell = [&](Rule rule, std::pair<bool, std::uint64_t> key, ResourceUse expected, ResourceUse found,
+    const auto tell = [&](Rule rule, ResourceKey key, ResourceUse expected, ResourceUse found,
                           std::string remedy) {
         statement_problems_.push_back(
             {rule, ErrorCode::validation, "verify statement", "'" + statement_name_ + "', " + name_of_resource(key),

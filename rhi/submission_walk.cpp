@@ -167,6 +167,7 @@ SubmissionWalk::Step SubmissionWalk::check_group(BindGroupObject& group, const c
     if (auto failed = stale(group.buffers, "buffer")) return failed;
     if (auto failed = stale(group.textures, "texture")) return failed;
     if (auto failed = stale(group.samplers, "sampler")) return failed;
+    if (auto failed = stale(group.acceleration_structures, "acceleration structure")) return failed;
     group.checked_epoch = device_.destructions;
     return {};
 }
@@ -183,6 +184,12 @@ SubmissionWalk::Step SubmissionWalk::merge_group(BindGroupObject& group, ShaderS
         const ResourceState state = for_stages(texture.state, stages);
         if (state.stages == ShaderStage::none) continue;
         if (auto failed = use(attempted, texture.slot->object, texture.range, state)) return failed;
+    }
+    for (const AccelerationStructureUse& structure : group.acceleration_structures) {
+        const ResourceState state = for_stages(structure.state, stages);
+        if (state.stages == ShaderStage::none) continue;
+        if (auto failed = check_structure(structure.slot->object, attempted)) return failed;
+        if (auto failed = use(attempted, structure.slot->object, state)) return failed;
     }
     group.merged_epoch = tracker_.epoch();
     return {};

@@ -45,12 +45,18 @@ class SubmissionWalk {
     Step resolve_view(ViewReference& view, const char* attempted, TextureObject*& texture, bool single);
     Step check_copy(const CommandHeader& header, std::byte* payload);
     Step copy_scope(CommandHeader& header);
+    Step build(CommandHeader& header, BuildAccelerationStructureCommand& command);
+    Step check_structure(const AccelerationStructureObject& structure, const char* attempted) const;
     Step hazard(const char* attempted, std::string what, ResourceState state, bool is_texture) const;
     void unset_state();
 
     Step use(const char* attempted, BufferObject& buffer, ResourceState state) {
         if (tracker_.use(buffer, state)) return {};
         return hazard(attempted, "buffer '" + buffer.desc.name + "'", buffer.scope_state, false);
+    }
+    Step use(const char* attempted, AccelerationStructureObject& structure, ResourceState state) {
+        if (tracker_.use(structure, state)) return {};
+        return hazard(attempted, "acceleration structure '" + structure.desc.name + "'", structure.scope_state, false);
     }
     Step use(const char* attempted, TextureObject& texture, const SubresourceRange& range, ResourceState state,
              bool discard = false) {
@@ -104,7 +110,10 @@ class SubmissionWalk {
     bool in_statement_ = false;
     std::string statement_name_;
     std::vector<StatedAccess> stated_;
-    std::map<std::pair<bool, std::uint64_t>, ResourceUse> actual_;  ///< By (is texture, handle's index).
+    /// Kind of a resource and the index of its handle.
+    enum class ResourceKind : std::uint8_t { buffer, texture, acceleration_structure };
+    using ResourceKey = std::pair<ResourceKind, std::uint64_t>;
+    std::map<ResourceKey, ResourceUse> actual_;
     std::vector<Problem> statement_problems_;
 };
 

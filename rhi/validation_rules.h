@@ -43,6 +43,12 @@
     X(242, view_format, "view-format", "A view has a format that its texture cannot be seen in.")                     \
     X(250, query_pool_count, "query-pool-count", "A query pool has a count outside of 1 to 65,536.")                  \
     X(251, query_type, "query-type", "The device has no queries of this type.")                                       \
+    X(260, acceleration_structure_unsupported, "acceleration-structure-unsupported",                                  \
+      "The device has no acceleration structures, or none of this geometry.")                                         \
+    X(261, acceleration_structure_level, "acceleration-structure-level",                                              \
+      "An acceleration structure has what the other level has, nothing at all, or too much.")                         \
+    X(262, acceleration_structure_geometry, "acceleration-structure-geometry",                                        \
+      "A geometry of an acceleration structure has counts, a format or a stride that do not fit.")                    \
     X(301, layout_duplicate, "layout-duplicate", "A bind-group layout holds a binding twice.")                        \
     X(302, layout_stages, "layout-stages", "A binding of a layout is seen by no shader stage.")                       \
     X(303, layout_limit, "layout-limit", "A layout or pipeline holds more bindings of a kind than a stage can have.") \
@@ -62,6 +68,8 @@
     X(319, group_element, "group-element", "An entry has an index beyond the array of its binding.")                  \
     X(320, group_unfilterable, "group-unfilterable", "A linear filter is combined with a format that cannot be filtered.") \
     X(321, group_storage_view, "group-storage-view", "A storage image views more than one mip, or several samples.")  \
+    X(322, group_acceleration_structure_level, "group-acceleration-structure-level",                                  \
+      "A bottom-level acceleration structure is bound to a shader.")                                                  \
     X(401, shader_stage, "shader-stage", "A shader has no stage or several.")                                         \
     X(402, shader_capability, "shader-capability", "A shader needs a feature that the device lacks.")                 \
     X(403, shader_storage_stage, "shader-storage-stage",                                                              \
@@ -143,6 +151,18 @@
     X(570, texture_hazard, "texture-hazard",                                                                          \
       "A part of a texture is used in two ways in one pass or dispatch that exclude each other.")                     \
     X(571, buffer_hazard, "buffer-hazard", "A buffer is written and read in one pass or dispatch in ways that exclude each other.") \
+    X(580, build_sources, "build-sources", "A build has sources of another kind or number than its structure.")       \
+    X(581, build_usage, "build-usage", "A buffer of a build lacks the usage for it.")                                 \
+    X(582, build_alignment, "build-alignment", "An offset into a buffer of a build is not aligned.")                  \
+    X(583, build_range, "build-range", "A build reads beyond a buffer.")                                              \
+    X(584, build_instance, "build-instance", "An instance has no bottom level, or values out of range.")              \
+    X(585, structure_update, "structure-update",                                                                      \
+      "An acceleration structure is updated that was not made for it, or that was never built.")                      \
+    X(586, structure_unbuilt, "structure-unbuilt", "An acceleration structure is read that was never built.")         \
+    X(587, structure_bottom_destroyed, "structure-bottom-destroyed",                                                  \
+      "A top-level acceleration structure is read after one of its bottom levels was destroyed.")                     \
+    X(588, structure_outdated, "structure-outdated",                                                                  \
+      "A top-level acceleration structure is read after one of its bottom levels was built or updated.")              \
     X(601, map_memory, "map-memory", "A buffer is mapped whose memory the host cannot reach.")                        \
     X(602, map_state, "map-state", "A buffer is mapped twice, or unmapped without being mapped.")                     \
     X(603, mapped_in_submission, "mapped-in-submission", "A buffer is used by submitted work while it is mapped.")    \

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <new>
 
+#include "backends/cpu/acceleration_structure.h"
 #include "backends/cpu/buffer.h"
 #include "backends/cpu/sampler.h"
 #include "backends/cpu/texture.h"
@@ -70,8 +71,11 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> CpuBindGroup::create(rhi::Backe
                 descriptor.size = std::min(binding.size, buffer->size_from(binding.offset));
             }
             const bool has_texture =
-                binding.type != rhi::BindingType::sampler && !binding.buffer && binding.view.texture.object;
+                binding.type != rhi::BindingType::sampler && !binding.buffer && !binding.acceleration_structure &&
+                                     binding.view.texture.object;
             if (has_texture) descriptor.image = texture_of(binding.view.texture).view(binding.view);
+            if (const auto* structure = static_cast<const CpuAccelerationStructure*>(binding.acceleration_structure))
+                descriptor.data = reinterpret_cast<std::byte*>(structure->scene());
             if (binding.sampler) descriptor.sampler = &static_cast<const CpuSampler*>(binding.sampler)->state;
         }
     } catch (const std::bad_alloc&) {

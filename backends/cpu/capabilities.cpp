@@ -55,7 +55,7 @@ rhi::Capabilities find_capabilities(std::uint32_t subgroup_size) {
     result.sample_rate_shading = true;
     result.block_compression = true;
     result.float_color_targets = true;
-    result.ray_query = false;
+    result.ray_query = true;
     result.texture_views = result.texture_view_formats = true;
     result.fill_storage_without_format = true;
 

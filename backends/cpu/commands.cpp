@@ -4,6 +4,8 @@
 #include <cstring>
 #include <type_traits>
 
+#include "backends/cpu/acceleration_structure.h"
+
 namespace nacre::cpu {
 namespace {
 
@@ -154,6 +156,10 @@ void Executor::execute(const CommandHeader& header, const std::byte* payload) {
         }
         case CommandType::generate_mips:
             return transfer_.generate_mips(texture_of(NACRE_COMMAND(GenerateMipsCommand).texture).whole());
+        case CommandType::build_acceleration_structure: {
+            const auto& command = NACRE_COMMAND(BuildAccelerationStructureCommand);
+            return static_cast<CpuAccelerationStructure*>(command.structure.object)->build(command);
+        }
         case CommandType::write_timestamp: {
             const auto& command = NACRE_COMMAND(WriteTimestampCommand);
             return write_timestamp(pool_of(command), command.index);

@@ -17,6 +17,8 @@
 #include <tbb/version.h>
 #endif
 
+#include "backends/cpu/acceleration_structure.h"
+
 namespace nacre::cpu {
 namespace {
 
@@ -135,6 +137,21 @@ Expected<std::unique_ptr<rhi::BackendComputePipeline>> CpuDevice::create_compute
 Expected<std::unique_ptr<rhi::BackendQueryPool>> CpuDevice::create_query_pool(const rhi::QueryPoolDesc& desc) {
     NACRE_CHECK(check_lost("create query pool"));
     return std::make_unique<CpuQueryPool>(desc);
+}
+
+Expected<std::unique_ptr<rhi::BackendAccelerationStructure>> CpuDevice::create_acceleration_structure(
+    const rhi::AccelerationStructureDesc& desc) {
+    NACRE_CHECK(check_lost("create acceleration structure"));
+    // Embree starts threads when it is opened: only for those who trace rays.
+    if (!rays_) {
+#ifdef NACRE_CPU_PLAIN_THREADS
+        constexpr std::uint32_t build_threads = 1;
+#else
+        const std::uint32_t build_threads = scheduler_->thread_count();
+#endif
+        NACRE_TRY(rays_, RayDevice::create(build_threads));
+    }
+    return CpuAccelerationStructure::create(rays_, desc);
 }
 
 // Host and device share all memory.

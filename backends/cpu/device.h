@@ -10,6 +10,7 @@
 #include "backends/cpu/commands.h"
 #include "backends/cpu/compiler/compiler.h"
 #include "backends/cpu/queue.h"
+#include "backends/cpu/rays/ray_scene.h"
 
 namespace nacre::cpu {
 
@@ -46,6 +47,8 @@ class CpuDevice : public rhi::BackendDevice {
     Expected<std::unique_ptr<rhi::BackendComputePipeline>> create_compute_pipeline(
         const rhi::BackendComputePipelineDesc& desc) override;
     Expected<std::unique_ptr<rhi::BackendQueryPool>> create_query_pool(const rhi::QueryPoolDesc& desc) override;
+    Expected<std::unique_ptr<rhi::BackendAccelerationStructure>> create_acceleration_structure(
+        const rhi::AccelerationStructureDesc& desc) override;
 
     Expected<void> flush_mapped(rhi::BackendBuffer& buffer) override;
     Expected<void> invalidate_mapped(rhi::BackendBuffer& buffer) override;
@@ -70,6 +73,7 @@ class CpuDevice : public rhi::BackendDevice {
     rhi::FaultInjection faults_;
     std::shared_ptr<HostMemory> memory_;
     std::unique_ptr<Compiler> compiler_;
+    std::shared_ptr<RayDevice> rays_;  ///< Made when the first acceleration structure is.
     std::unique_ptr<Scheduler> scheduler_;
     Watchdog watchdog_;
     Executor executor_;  // Queue thread only.

@@ -268,6 +268,7 @@ void Executor::execute(const CommandHeader& header, const std::byte* payload, co
         case CommandType::pop_debug_group:
             if (driver_.debug_names && driver_.traits.debug_output) gl_.PopDebugGroup();
             break;
+        case CommandType::build_acceleration_structure:  // OpenGL has none.
         case CommandType::begin_statement:
         case CommandType::end_statement: break;
     }

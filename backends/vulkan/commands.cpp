@@ -269,6 +269,7 @@ void Commands::visit(const rhi::CommandHeader& header, const std::byte* payload,
         case end_occlusion_query: end_occlusion(NACRE_AS(EndOcclusionQueryCommand)); break;
         case push_debug_group: push_group(stream.strings[NACRE_AS(PushDebugGroupCommand).name].c_str()); break;
         case pop_debug_group: pop_group(); break;
+        case build_acceleration_structure:  // No device of this backend offers them.
         case begin_statement:
         case end_statement: break;
     }

@@ -39,7 +39,7 @@ TEST(Capabilities, ListTellsValuesAndFormats) {
     std::map<std::string, std::string> values;
     for (const CapabilityEntry& entry : list_capabilities(full_capabilities())) values[entry.name] = entry.value;
     EXPECT_EQ(values["dual_source_blending"], "yes");
-    EXPECT_EQ(values["ray_query"], "no");
+    EXPECT_EQ(values["shader_float64"], "no");
     EXPECT_EQ(values["max_texture_2d"], "16384");
     EXPECT_EQ(values["max_workgroup_size"], "1024, 1024, 64");
     EXPECT_EQ(values["format rgb9e5_float"], "sampled filtered");

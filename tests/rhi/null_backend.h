@@ -38,6 +38,7 @@ inline rhi::Capabilities full_capabilities() {
     c.storage_in_vertex = c.storage_in_fragment = c.dual_source_blending = c.independent_blend = true;
     c.descriptor_indexing = c.anisotropic_filtering = c.border_color = c.depth_clamp = c.depth_bias_clamp = true;
     c.wireframe = c.cube_arrays = c.multi_draw_indirect = c.indirect_first_instance = c.timestamps = true;
+    c.ray_query = true;
     c.precise_occlusion = c.block_compression = c.float_color_targets = c.base_instance = c.texture_views =
         c.texture_view_formats = true;
     c.max_texture_1d = c.max_texture_2d = c.max_texture_cube = 16384;
@@ -149,6 +150,10 @@ class NullDevice final : public rhi::BackendDevice {
     }
     Expected<std::unique_ptr<rhi::BackendQueryPool>> create_query_pool(const rhi::QueryPoolDesc&) override {
         return make<rhi::BackendQueryPool>();
+    }
+    Expected<std::unique_ptr<rhi::BackendAccelerationStructure>> create_acceleration_structure(
+        const rhi::AccelerationStructureDesc&) override {
+        return make<rhi::BackendAccelerationStructure>();
     }
     Expected<void> flush_mapped(rhi::BackendBuffer&) override { return {}; }
     Expected<void> invalidate_mapped(rhi::BackendBuffer&) override { return {}; }

@@ -33,6 +33,7 @@ std::vector<Breach> pipeline_breaches();
 std::vector<Breach> pass_breaches();
 std::vector<Breach> draw_breaches();
 std::vector<Breach> copy_breaches();
+std::vector<Breach> structure_breaches();
 std::vector<Breach> other_breaches();
 
 }  // namespace nacre::test

@@ -22,7 +22,7 @@ using enum Format;
 std::vector<Breach> all_breaches() {
     std::vector<Breach> all;
     for (auto& part : {handle_breaches(), resource_breaches(), group_breaches(), pipeline_breaches(), pass_breaches(),
-                       draw_breaches(), copy_breaches(), other_breaches()})
+                       draw_breaches(), copy_breaches(), structure_breaches(), other_breaches()})
         all.insert(all.end(), part.begin(), part.end());
     return all;
 }

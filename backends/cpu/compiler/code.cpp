@@ -32,6 +32,7 @@
 #include <llvm/Transforms/Scalar/SimplifyCFG.h>
 
 #include "backends/cpu/images/image_operations.h"
+#include "backends/cpu/rays/ray_query.h"
 #include "backends/cpu/shader_interface.h"
 
 namespace nacre::cpu {
@@ -198,6 +199,9 @@ class OrcGenerator final : public CodeGenerator {
             symbols[jit_->mangleAndIntern(symbol)] = {llvm::orc::ExecutorAddr::fromPtr(function), llvm::JITSymbolFlags::Exported | llvm::JITSymbolFlags::Callable};
         };
         define("nacre_cpu_image", image_function(lanes_));
+        define("nacre_cpu_ray_proceed", ray_proceed_function());
+        define("nacre_cpu_ray_confirm", ray_confirm_function());
+        define("nacre_cpu_ray_property", ray_property_function());
         // What LLVM and the functions in double precision call.
         using One = double (*)(double);
         using Two = double (*)(double, double);

@@ -40,7 +40,7 @@ void Emitter::emit_instruction(const Instruction& at) {
         default: break;
     }
     if (emit_stage(at) || emit_memory(at) || emit_arithmetic(at) || emit_composite(at) || emit_extended(at) ||
-        emit_image(at) || emit_atomic(at) || emit_subgroup(at))
+        emit_image(at) || emit_ray(at) || emit_atomic(at) || emit_subgroup(at))
         return;
     reject(fmt::format("the instruction with opcode {} is not supported", static_cast<unsigned>(at.op)));
 }

@@ -55,6 +55,7 @@ Pointer Emitter::pointer_to(Id id) {
     Pointer pointer;
     pointer.storage = variable.storage;
     pointer.type = variable.type;
+    if (is_ray_query(variable.type)) return ray_query_pointer(id);
     switch (variable.storage) {
         case StorageClass::Function:
         case StorageClass::Private:
@@ -556,6 +557,10 @@ void Emitter::declare_variables() {
         if (variable.storage != StorageClass::Private && variable.storage != StorageClass::Output) continue;
         if (variable.storage == StorageClass::Output && std::ranges::find(module.interface(), id) == module.interface().end())
             continue;  // Of another entry point.
+        if (is_ray_query(variable.type)) {
+            clear_ray_query(id);
+            continue;
+        }
         LaneVariable& made = make_lane_variable(id, variable.type, !uniformity.has_divergent_content(id));
         std::vector<Component> initial;
         if (variable.initializer) initial = get(variable.initializer).components;
@@ -568,6 +573,10 @@ void Emitter::declare_variables() {
 bool Emitter::emit_memory(const Instruction& at) {
     switch (at.op) {
         case Op::OpVariable: {
+            if (is_ray_query(module.variable(at.result)->type)) {
+                clear_ray_query(at.result);
+                return true;
+            }
             LaneVariable& variable = make_lane_variable(at.result, module.variable(at.result)->type,
                                                         !uniformity.has_divergent_content(at.result));
             if (at.operand(1)) {

@@ -193,6 +193,15 @@ class Emitter {
     [[nodiscard]] std::uint32_t image_integer_flag(Id image_type) const;
     Component from_word(const Component& word, llvm::Type* kind);       ///< Bits of 32 as a value of a type.
     Component to_word(const Component& value);
+    bool emit_ray(const Instruction& at);                               // emit_rays.cpp
+    /// Whether a type is a ray query or an array of them.
+    [[nodiscard]] bool is_ray_query(Id type) const;
+    Pointer ray_query_pointer(Id variable);
+    void clear_ray_query(Id variable);
+    /// Runs `body` for each different query that the lanes mean.
+    void for_each_query(Id pointer, const std::function<void(llvm::Value* query, llvm::Value* lanes_on)>& body);
+    std::vector<Component> read_query(Id pointer, std::span<const std::size_t> offsets, llvm::Type* scalar);
+    std::vector<Component> ray_property(Id pointer, std::uint32_t property, std::uint32_t words, llvm::Type* scalar);
     bool emit_subgroup(const Instruction& at);                          // emit_subgroups.cpp
     llvm::Value* permute(llvm::Value* values, llvm::Value* sources);    ///< Lane i gets the value of lane sources[i].
     virtual bool emit_stage(const Instruction&) { return false; }       // derivatives, barriers, interpolation
@@ -251,6 +260,7 @@ class Emitter {
     llvm::AllocaInst* image_arguments = nullptr;
     std::unordered_map<Id, std::unique_ptr<LaneVariable>> lane_variables;
     std::unordered_map<Id, std::uint64_t> workgroup_offsets;
+    std::unordered_map<Id, llvm::AllocaInst*> ray_queries;
     std::uint64_t workgroup_variable_bytes = 0;
     bool has_side_effects = false;             ///< Some store, atomic or image store was emitted.
 

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "backends/cpu/rays/ray_query.h"
 #include "rhi/spirv.h"
 
 namespace nacre::cpu {
@@ -110,6 +111,7 @@ std::uint64_t Module::tight_size(Id id) const {
             return tight_size(kind.element) * kind.count;
         }
         case TypeKind::structure: return tight_offset(id, static_cast<std::uint32_t>(kind.members.size()));
+        case TypeKind::ray_query: return sizeof(RayQueryLanes);  // Of all lanes together.
         default: return 0;
     }
 }

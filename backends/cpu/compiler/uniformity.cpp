@@ -212,6 +212,16 @@ void Uniformity::visit(const Instruction& at, Id block) {
         case Op::OpAtomicXor: case Op::OpAtomicFAddEXT: case Op::OpAtomicFMinEXT: case Op::OpAtomicFMaxEXT:
         case Op::OpImageTexelPointer: case Op::OpGroupNonUniformElect: case Op::OpGroupNonUniformInverseBallot:
         case Op::OpGroupNonUniformShuffle: case Op::OpGroupNonUniformShuffleXor: case Op::OpGroupNonUniformShuffleUp:
+        case Op::OpRayQueryProceedKHR: case Op::OpRayQueryGetIntersectionTypeKHR: case Op::OpRayQueryGetRayTMinKHR:
+        case Op::OpRayQueryGetRayFlagsKHR: case Op::OpRayQueryGetIntersectionTKHR:
+        case Op::OpRayQueryGetIntersectionInstanceCustomIndexKHR: case Op::OpRayQueryGetIntersectionInstanceIdKHR:
+        case Op::OpRayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetKHR:
+        case Op::OpRayQueryGetIntersectionGeometryIndexKHR: case Op::OpRayQueryGetIntersectionPrimitiveIndexKHR:
+        case Op::OpRayQueryGetIntersectionBarycentricsKHR: case Op::OpRayQueryGetIntersectionFrontFaceKHR:
+        case Op::OpRayQueryGetIntersectionCandidateAABBOpaqueKHR:
+        case Op::OpRayQueryGetIntersectionObjectRayDirectionKHR: case Op::OpRayQueryGetIntersectionObjectRayOriginKHR:
+        case Op::OpRayQueryGetWorldRayDirectionKHR: case Op::OpRayQueryGetWorldRayOriginKHR:
+        case Op::OpRayQueryGetIntersectionObjectToWorldKHR: case Op::OpRayQueryGetIntersectionWorldToObjectKHR:
         case Op::OpGroupNonUniformShuffleDown: case Op::OpGroupNonUniformQuadBroadcast:
         case Op::OpGroupNonUniformQuadSwap: case Op::OpIsHelperInvocationEXT:
             return mark(divergent_, at.result);

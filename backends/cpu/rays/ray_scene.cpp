@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "backends/cpu/rays/ray_scene.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstring>
+#include <new>
+
+#include "backends/cpu/rays/embree.h"
+#include "backends/cpu/rays/traversal.h"
+#include "core/log.h"
+
+namespace nacre::cpu {
+namespace {
+
+void report(void*, RTCError code, const char* text) {
+    log_message(LogLevel::debug, fmt::format("Embree says ({}): {}", static_cast<int>(code), text ? text : ""));
+}
+
+/// Inverse of an affine matrix of three rows of four, in double precision; false where there is none that Embree can use.
+bool invert(const std::array<float, 12>& matrix, std::array<float, 12>& inverse) {
+    const auto m = [&](int row, int column) { return static_cast<double>(matrix[static_cast<std::size_t>(row * 4 + column)]); };
+    double cofactors[3][3];
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) {
+            const int r1 = (row + 1) % 3, r2 = (row + 2) % 3, c1 = (column + 1) % 3, c2 = (column + 2) % 3;
+            cofactors[row][column] = m(r1, c1) * m(r2, c2) - m(r1, c2) * m(r2, c1);
+        }
+    const double determinant = m(0, 0) * cofactors[0][0] + m(0, 1) * cofactors[0][1] + m(0, 2) * cofactors[0][2];
+    if (!std::isfinite(determinant) || determinant == 0.0) return false;
+    for (int row = 0; row < 3; ++row) {
+        double offset = 0;
+        for (int column = 0; column < 3; ++column) {
+            const double element = cofactors[column][row] / determinant;
+            if (!(std::abs(element) <= largest_inverse_element)) return false;
+            inverse[static_cast<std::size_t>(row * 4 + column)] = static_cast<float>(element);
+            offset -= element * m(column, 3);
+        }
+        if (!(std::abs(offset) <= largest_inverse_offset)) return false;
+        inverse[static_cast<std::size_t>(row * 4 + 3)] = static_cast<float>(offset);
+    }
+    return true;
+}
+
+RTCBuildQuality quality_of(rhi::BuildPreference prefer) {
+    return prefer == rhi::BuildPreference::fast_build ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_MEDIUM;
+}
+
+/// `is_dynamic` scenes keep what is needed to change them.
+RTCScene new_scene(RTCDevice device, rhi::BuildPreference prefer, bool is_dynamic) {
+    RTCScene scene = rtcNewScene(device);
+    if (!scene) throw std::bad_alloc();
+    // Without `robust` rays slip through the edges that triangles share.
+    unsigned flags = RTC_SCENE_FLAG_ROBUST | embree::filtered_scene;
+    if (is_dynamic) flags |= RTC_SCENE_FLAG_DYNAMIC;
+    rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(flags));
+    rtcSetSceneBuildQuality(scene, quality_of(prefer));
+    return scene;
+}
+
+}  // namespace
+
+Expected<std::shared_ptr<RayDevice>> RayDevice::create(std::uint32_t threads, const std::string& options) {
+    std::shared_ptr<RayDevice> made(new RayDevice());
+    // Threads of Embree's arena are those that builds use; queries run on the caller's.
+    const std::string text = fmt::format("threads={},set_affinity=0{}{}", threads, options.empty() ? "" : ",", options);
+    made->device_ = rtcNewDevice(text.c_str());
+    if (!made->device_)
+        return fail(ErrorCode::unsupported, "open Embree", text,
+                    fmt::format("it says error {}", static_cast<int>(rtcGetDeviceError(nullptr))),
+                    "Reinstall Embree 3.");
+    const auto has = [&](RTCDeviceProperty property) { return rtcGetDeviceProperty(made->device_, property) != 0; };
+    if (!has(RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) || !has(RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED))
+        return fail(ErrorCode::unsupported, "open Embree", "libembree3", "it was built without ray masks or filter functions",
+                    "Use an Embree with EMBREE_RAY_MASK and EMBREE_FILTER_FUNCTION, as Debian's.");
+    if (has(RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) made->packet_width_ = 8;
+    if (has(RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) made->packet_width_ = 16;
+    rtcSetDeviceErrorFunction(made->device_, report, nullptr);
+    return made;
+}
+
+RayDevice::~RayDevice() {
+    if (device_) rtcReleaseDevice(device_);
+}
+
+void RayDevice::check_memory() const {
+    const RTCError error = rtcGetDeviceError(device_);
+    if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+    // Anything else is a fault of this file; the debug log has its text.
+}
+
+RayMesh::RayMesh(std::shared_ptr<RayDevice> device, std::vector<rhi::GeometryDesc> geometries, bool allow_update,
+                 rhi::BuildPreference prefer)
+    : device_(std::move(device)),
+      geometries_(std::move(geometries)),
+      attached_(geometries_.size(), nullptr),
+      allow_update_(allow_update),
+      prefer_(prefer) {}
+
+RayMesh::~RayMesh() {
+    if (scene_) rtcReleaseScene(scene_);
+}
+
+void RayMesh::start() {
+    // Top levels that were built over the old scene hold on to it.
+    if (scene_) rtcReleaseScene(scene_);
+    scene_ = nullptr;
+    scene_ = new_scene(device_->handle(), prefer_, allow_update_);
+    has_triangles_ = has_opaque_ = has_non_opaque_ = false;
+    bytes_ = 0;
+    for (std::size_t i = 0; i < geometries_.size(); ++i) {
+        attached_[i] = nullptr;
+        const rhi::GeometryDesc& desc = geometries_[i];
+        if (desc.primitive_count == 0 || desc.vertex_count == 0) continue;
+        RTCGeometry geometry = rtcNewGeometry(device_->handle(), RTC_GEOMETRY_TYPE_TRIANGLE);
+        if (!geometry) throw std::bad_alloc();
+        // The scene keeps it.
+        rtcAttachGeometryByID(scene_, geometry, static_cast<unsigned>(i));
+        rtcReleaseGeometry(geometry);
+        if (!rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, desc.vertex_count) ||
+            !rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, desc.primitive_count))
+            throw std::bad_alloc();
+        rtcSetGeometryBuildQuality(geometry, quality_of(prefer_));
+        if (!desc.opaque) set_candidate_filter(geometry);
+        attached_[i] = geometry;
+        bytes_ += std::uint64_t{12} * desc.vertex_count + std::uint64_t{12} * desc.primitive_count;
+        has_triangles_ = true;
+        (desc.opaque ? has_opaque_ : has_non_opaque_) = true;
+    }
+}
+
+bool RayMesh::fill(std::size_t index, const RayGeometrySource& source, bool is_update) {
+    const rhi::GeometryDesc& desc = geometries_[index];
+    RTCGeometry geometry = attached_[index];
+    auto* positions = static_cast<float*>(rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_VERTEX, 0));
+    auto* triangles = static_cast<std::uint32_t*>(rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_INDEX, 0));
+    if (!positions || !triangles) return false;
+    // Vertices that cannot be, become the first that can; triangles with one of them shrink to a point, which nothing hits.
+    std::vector<bool> is_bad;
+    float stand_in[3] = {0, 0, 0};
+    bool has_stand_in = false;
+    for (std::uint32_t i = 0; i < desc.vertex_count; ++i) {
+        const std::uint64_t at = std::uint64_t{i} * desc.vertex_stride;
+        float* position = positions + std::size_t{i} * 3;
+        bool is_good = at + 12 <= source.vertex_bytes;
+        if (is_good) {
+            std::memcpy(position, source.vertices + at, 12);
+            for (int axis = 0; axis < 3; ++axis) is_good = is_good && std::abs(position[axis]) <= largest_vertex_coordinate;
+        }
+        if (!is_good) {
+            if (is_bad.empty()) is_bad.resize(desc.vertex_count);
+            is_bad[i] = true;
+        } else if (!has_stand_in) {
+            has_stand_in = true;
+            std::memcpy(stand_in, position, 12);
+        }
+    }
+    if (!is_bad.empty())
+        for (std::uint32_t i = 0; i < desc.vertex_count; ++i)
+            if (is_bad[i]) std::memcpy(positions + std::size_t{i} * 3, stand_in, 12);
+    const auto is_usable = [&](std::uint32_t vertex) {
+        return vertex < desc.vertex_count && (is_bad.empty() || !is_bad[vertex]);
+    };
+    bool indices_changed = false;
+    for (std::uint32_t i = 0; i < desc.primitive_count; ++i) {
+        std::uint32_t corners[3];
+        for (std::uint32_t k = 0; k < 3; ++k) {
+            const std::uint64_t number = std::uint64_t{i} * 3 + k;
+            corners[k] = ~0u;
+            if (!desc.index_type) {
+                corners[k] = static_cast<std::uint32_t>(number);
+            } else if (*desc.index_type == rhi::IndexType::uint16) {
+                std::uint16_t value;
+                if (number * 2 + 2 > source.index_bytes) continue;
+                std::memcpy(&value, source.indices + number * 2, 2);
+                corners[k] = value;
+            } else if (number * 4 + 4 <= source.index_bytes) {
+                std::memcpy(&corners[k], source.indices + number * 4, 4);
+            }
+        }
+        std::uint32_t* triangle = triangles + std::size_t{i} * 3;
+        if (!is_usable(corners[0]) || !is_usable(corners[1]) || !is_usable(corners[2])) {
+            std::uint32_t point = 0;
+            for (const std::uint32_t corner : corners)
+                if (is_usable(corner)) point = corner;
+            corners[0] = corners[1] = corners[2] = point;
+        }
+        indices_changed = indices_changed || std::memcmp(triangle, corners, 12) != 0;
+        std::memcpy(triangle, corners, 12);
+    }
+    rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0);
+    if (is_update) {
+        // Refitting keeps the tree, so it keeps who is whose neighbor.
+        if (indices_changed) rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0);
+        rtcSetGeometryBuildQuality(geometry, indices_changed ? quality_of(prefer_) : RTC_BUILD_QUALITY_REFIT);
+    }
+    rtcCommitGeometry(geometry);
+    return true;
+}
+
+void RayMesh::build(std::span<const RayGeometrySource> sources, bool is_update) {
+    is_update = is_update && scene_ && allow_update_;
+    if (!is_update) start();
+    for (std::size_t i = 0; i < geometries_.size() && i < sources.size(); ++i)
+        if (attached_[i] && !fill(i, sources[i], is_update)) throw std::bad_alloc();
+    rtcCommitScene(scene_);
+    device_->check_memory();
+}
+
+RayScene::RayScene(std::shared_ptr<RayDevice> device, bool allow_update, rhi::BuildPreference prefer)
+    : device_(std::move(device)), allow_update_(allow_update), prefer_(prefer) {}
+
+RayScene::~RayScene() {
+    if (scene_) rtcReleaseScene(scene_);
+}
+
+void RayScene::build(std::vector<RayInstance> instances, bool) {
+    // A tree over instances is small; it is always made anew.
+    RTCScene scene = new_scene(device_->handle(), prefer_, false);
+    bool has_candidates = false, has_overrides = false;
+    for (std::size_t i = 0; i < instances.size(); ++i) {
+        RayInstance& instance = instances[i];
+        if (!instance.mesh || !instance.mesh->scene() || !instance.mesh->has_triangles() || (instance.mask & 0xff) == 0)
+            continue;
+        if (!invert(instance.to_world, instance.to_object)) continue;
+        RTCGeometry geometry = rtcNewGeometry(device_->handle(), RTC_GEOMETRY_TYPE_INSTANCE);
+        if (!geometry) {
+            rtcReleaseScene(scene);
+            throw std::bad_alloc();
+        }
+        rtcSetGeometryInstancedScene(geometry, instance.mesh->scene());
+        rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, instance.to_world.data());
+        rtcSetGeometryMask(geometry, instance.mask & 0xff);
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometryByID(scene, geometry, static_cast<unsigned>(i));
+        rtcReleaseGeometry(geometry);
+        if (has_any(instance.flags, rhi::InstanceFlags::force_no_opaque)) {
+            has_candidates = true;
+            has_overrides = has_overrides || instance.mesh->has_opaque();
+        } else if (has_any(instance.flags, rhi::InstanceFlags::force_opaque)) {
+            has_overrides = has_overrides || instance.mesh->has_non_opaque();
+        } else {
+            has_candidates = has_candidates || instance.mesh->has_non_opaque();
+        }
+    }
+    rtcCommitScene(scene);
+    if (scene_) rtcReleaseScene(scene_);
+    scene_ = scene;
+    instances_ = std::move(instances);
+    has_candidates_ = has_candidates;
+    has_overrides_ = has_overrides;
+    device_->check_memory();
+}
+
+}  // namespace nacre::cpu

@@ -1,0 +1,380 @@
+// SPDX-License-Identifier: Apache-2.0
+// How queries meet the scene. Lanes go one of three ways:
+// - Where every hit counts at once, one packet of Embree on the query's own memory.
+// - Where some geometry is not opaque, one packet whose filter collects candidates by the way and lets the ray go on; the shader then
+//   gets them by rising distance. Of the candidates of a lane only the nearest `kept_candidates` have room.
+// - Where that room was too small, or a ray or instance overrules opacity or culls, one ray at a time with a filter for all geometry.
+//   It begins behind the last candidate that the shader saw. A single ray gives a triangle the same distance each time, a packet may
+//   not, so what is found here is in one order: that of (distance, instance, geometry, primitive).
+#include "backends/cpu/rays/traversal.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <tuple>
+
+#include "backends/cpu/rays/embree.h"
+#include "backends/cpu/rays/ray_scene.h"
+
+namespace nacre::cpu {
+namespace {
+
+constexpr std::uint32_t flags_against_packets =
+    ray_no_opaque | ray_cull_back_facing | ray_cull_front_facing | ray_cull_opaque | ray_cull_no_opaque;
+
+/// Calls `body` for each lane of a mask, from the lowest.
+template <typename Body>
+void for_each_lane(std::uint32_t lanes, Body&& body) {
+    for (; lanes != 0; lanes &= lanes - 1) body(static_cast<std::uint32_t>(std::countr_zero(lanes)));
+}
+
+auto order_of(const RayCandidate& c) { return std::tuple(c.t, c.instance, c.geometry, c.primitive); }
+
+enum class Kept { yes, twice, no_room };
+
+/// Puts a candidate into its place of a list of rising order; where the list is full, the last one falls out.
+Kept keep(RayCandidate* list, std::uint32_t& count, const RayCandidate& candidate) {
+    std::uint32_t at = count;
+    while (at > 0 && order_of(candidate) < order_of(list[at - 1])) --at;
+    if (at > 0 && order_of(list[at - 1]) == order_of(candidate)) return Kept::twice;
+    if (at == kept_candidates) return Kept::no_room;
+    const bool is_full = count == kept_candidates;
+    for (std::uint32_t i = is_full ? count - 1 : count; i > at; --i) list[i] = list[i - 1];
+    list[at] = candidate;
+    if (is_full) return Kept::no_room;
+    ++count;
+    return Kept::yes;
+}
+
+/// A call of Embree, for filters.
+struct Call : embree::CallContext {
+    enum class Way { all_count, packet, single };
+    Call(Way how, bool is_coherent, RayQueryLanes& query_, embree::Filter filter = nullptr)
+        : CallContext(is_coherent, filter), way(how), query(query_) {}
+    Way way;
+    RayQueryLanes& query;
+    // Single rays.
+    const RayScene* scene = nullptr;
+    std::uint32_t lane = 0;
+    bool has_last = false;
+    RayCandidate last{};  ///< Candidates up to this one were seen.
+};
+
+RayCandidate candidate_of(const RTCFilterFunctionNArguments& arguments, unsigned i) {
+    RTCHitN* hit = arguments.hit;
+    const unsigned n = arguments.N;
+    return {RTCRayN_tfar(arguments.ray, n, i),
+            RTCHitN_u(hit, n, i),
+            RTCHitN_v(hit, n, i),
+            RTCHitN_primID(hit, n, i),
+            RTCHitN_geomID(hit, n, i),
+            RTCHitN_instID(hit, n, i, 0),
+            {RTCHitN_Ng_x(hit, n, i), RTCHitN_Ng_y(hit, n, i), RTCHitN_Ng_z(hit, n, i)}};
+}
+
+/// Of geometry that is not opaque. Packets may come as single rays, so lanes are told by their numbers.
+void collect(const RTCFilterFunctionNArguments* arguments) {
+    auto& call = static_cast<Call&>(embree::context_of(*arguments));
+    if (call.way != Call::Way::packet) return;
+    for (unsigned i = 0; i < arguments->N; ++i) {
+        if (arguments->valid[i] == 0) continue;
+        const std::uint32_t lane = RTCRayN_id(arguments->ray, arguments->N, i);
+        if (lane >= max_lanes) continue;
+        if (keep(call.query.candidates[lane], call.query.candidate_count[lane], candidate_of(*arguments, i)) == Kept::no_room)
+            call.query.has_more[lane] = 1;
+        arguments->valid[i] = 0;
+    }
+}
+
+/// Whether a hit counts at once, all things considered.
+bool counts_at_once(const RayInstance& instance, std::uint32_t geometry, std::uint32_t ray_flags) {
+    if (ray_flags & ray_opaque) return true;
+    if (ray_flags & ray_no_opaque) return false;
+    if (has_any(instance.flags, rhi::InstanceFlags::force_opaque)) return true;
+    if (has_any(instance.flags, rhi::InstanceFlags::force_no_opaque)) return false;
+    return instance.mesh->is_opaque(geometry);
+}
+
+/// Of all geometry, for a single ray.
+void judge(const RTCFilterFunctionNArguments* arguments) {
+    auto& call = static_cast<Call&>(embree::context_of(*arguments));
+    const std::uint32_t ray_flags = call.query.flags[call.lane];
+    for (unsigned i = 0; i < arguments->N; ++i) {
+        if (arguments->valid[i] == 0) continue;
+        const RayCandidate candidate = candidate_of(*arguments, i);
+        const RayInstance& instance = call.scene->instances()[candidate.instance];
+        const bool is_opaque = counts_at_once(instance, candidate.geometry, ray_flags);
+        bool is_culled = (ray_flags & (is_opaque ? ray_cull_opaque : ray_cull_no_opaque)) != 0;
+        if ((ray_flags & (ray_cull_back_facing | ray_cull_front_facing)) != 0 &&
+            !has_any(instance.flags, rhi::InstanceFlags::disable_culling)) {
+            // The ray that a filter sees is in the space of the object, as the normal is.
+            const float cosine = RTCRayN_dir_x(arguments->ray, arguments->N, i) * candidate.normal[0] +
+                                 RTCRayN_dir_y(arguments->ray, arguments->N, i) * candidate.normal[1] +
+                                 RTCRayN_dir_z(arguments->ray, arguments->N, i) * candidate.normal[2];
+            const bool is_front = (cosine > 0) != has_any(instance.flags, rhi::InstanceFlags::flip_facing);
+            is_culled = is_culled || (ray_flags & (is_front ? ray_cull_front_facing : ray_cull_back_facing)) != 0;
+        }
+        if (is_culled) {
+            arguments->valid[i] = 0;
+            continue;
+        }
+        if (is_opaque) continue;
+        if (call.has_last && order_of(candidate) <= order_of(call.last)) {
+            arguments->valid[i] = 0;
+            continue;
+        }
+        RayQueryLanes& query = call.query;
+        if (keep(query.candidates[call.lane], query.candidate_count[call.lane], candidate) == Kept::no_room)
+            query.has_more[call.lane] = 1;
+        arguments->valid[i] = 0;
+    }
+}
+
+/// Whether the rays of these lanes go about the same way, so that one walk through the tree serves all of them.
+bool are_coherent(const RayQueryLanes& query, std::uint32_t lanes) {
+    const auto first = static_cast<std::uint32_t>(std::countr_zero(lanes));
+    const float x = query.direction[0][first], y = query.direction[1][first], z = query.direction[2][first];
+    const float length2 = x * x + y * y + z * z;
+    // Squares throughout: the cosine of the largest angle is 0.95.
+    constexpr float smallest_cosine2 = 0.9f;
+    bool result = true;
+    for (std::uint32_t i = 0; i < max_lanes; ++i) {
+        const float dx = query.direction[0][i], dy = query.direction[1][i], dz = query.direction[2][i];
+        const float dot = x * dx + y * dy + z * dz;
+        const bool is_near = dot > 0 && dot * dot >= smallest_cosine2 * length2 * (dx * dx + dy * dy + dz * dz);
+        result = result && (is_near || (lanes >> i & 1) == 0);
+    }
+    return result;
+}
+
+/// Lanes whose rays Embree can be given: it stops the program at others.
+std::uint32_t traceable(const RayQueryLanes& query, std::uint32_t lanes) {
+    std::uint32_t good = 0;
+    for (std::uint32_t i = 0; i < max_lanes; ++i) {
+        bool is_good = query.t_min[i] >= 0 && query.t[i] >= query.t_min[i];  // False for what is no number.
+        for (int axis = 0; axis < 3; ++axis)
+            is_good = is_good && std::abs(query.origin[axis][i]) <= largest_ray_coordinate &&
+                      std::abs(query.direction[axis][i]) <= largest_ray_coordinate;
+        good |= std::uint32_t{is_good} << i;
+    }
+    return good & lanes;
+}
+
+/// Copies of rays and hits in packets that the machine has natively.
+template <typename Packet, std::uint32_t width>
+void intersect_parts(RTCScene scene, embree::CallContext& call, RTCRayHit16& rays, std::uint32_t lanes) {
+    constexpr std::size_t rows = sizeof(RTCRayHit16) / sizeof(float) / 16;
+    static_assert(sizeof(Packet) == rows * width * sizeof(float));
+    for (std::uint32_t first = 0; first < 16; first += width) {
+        const std::uint32_t part_lanes = lanes >> first & ((1u << width) - 1);
+        if (part_lanes == 0) continue;
+        Packet part;
+        alignas(64) int valid[width];
+        for (std::uint32_t i = 0; i < width; ++i) valid[i] = part_lanes >> i & 1 ? -1 : 0;
+        auto* to = reinterpret_cast<std::byte*>(&part);
+        auto* from = reinterpret_cast<std::byte*>(&rays) + first * sizeof(float);
+        for (std::size_t row = 0; row < rows; ++row)
+            std::memcpy(to + row * width * sizeof(float), from + row * 16 * sizeof(float), width * sizeof(float));
+        embree::intersect(scene, call, valid, part);
+        for (std::size_t row = 0; row < rows; ++row)
+            std::memcpy(from + row * 16 * sizeof(float), to + row * width * sizeof(float), width * sizeof(float));
+    }
+}
+
+RTCRayHit single_ray(const RTCRayHit16& rays, std::uint32_t lane) {
+    RTCRayHit ray;
+    ray.ray = rtcGetRayFromRayN(reinterpret_cast<RTCRayN*>(const_cast<RTCRay16*>(&rays.ray)), 16, lane);
+    ray.hit.geomID = ray.hit.primID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    return ray;
+}
+
+void put_single_hit(RTCRayHit16& rays, std::uint32_t lane, const RTCRayHit& ray) {
+    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+    rays.ray.tfar[lane] = ray.ray.tfar;
+    rays.hit.Ng_x[lane] = ray.hit.Ng_x, rays.hit.Ng_y[lane] = ray.hit.Ng_y, rays.hit.Ng_z[lane] = ray.hit.Ng_z;
+    rays.hit.u[lane] = ray.hit.u, rays.hit.v[lane] = ray.hit.v;
+    rays.hit.primID[lane] = ray.hit.primID;
+    rays.hit.geomID[lane] = ray.hit.geomID;
+    rays.hit.instID[0][lane] = ray.hit.instID[0];
+}
+
+RTCRayHit16& rays_of(RayQueryLanes& query) { return reinterpret_cast<RTCRayHit16&>(query); }
+
+/// Traces a packet in place.
+void intersect_lanes(const RayScene& scene, Call& call, RayQueryLanes& query, std::uint32_t lanes) {
+    RTCRayHit16& rays = rays_of(query);
+    if (std::has_single_bit(lanes)) {
+        // A fifth faster than a packet with one ray.
+        const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
+        RTCRayHit ray = single_ray(rays, lane);
+        embree::intersect(scene.scene(), call, ray);
+        return put_single_hit(rays, lane, ray);
+    }
+    switch (scene.packet_width()) {
+        case 16: {
+            alignas(64) int valid[16];
+            for (std::uint32_t i = 0; i < 16; ++i) valid[i] = -static_cast<int>(lanes >> i & 1);
+            return embree::intersect(scene.scene(), call, valid, rays);
+        }
+        case 8: return intersect_parts<RTCRayHit8, 8>(scene.scene(), call, rays, lanes);
+        default: return intersect_parts<RTCRayHit4, 4>(scene.scene(), call, rays, lanes);
+    }
+}
+
+/// Traces rays of which nothing is asked but whether they hit.
+void find_whether_hit(const RayScene& scene, Call& call, RayQueryLanes& query, std::uint32_t lanes) {
+    RTCRay16& rays = rays_of(query).ray;
+    alignas(64) float t[max_lanes];
+    std::memcpy(t, query.t, sizeof t);
+    if (std::has_single_bit(lanes) || scene.packet_width() != 16) {
+        for_each_lane(lanes, [&](std::uint32_t lane) {
+            RTCRay ray = rtcGetRayFromRayN(reinterpret_cast<RTCRayN*>(&rays), 16, lane);
+            embree::occluded(scene.scene(), call, ray);
+            query.t[lane] = ray.tfar;
+        });
+    } else {
+        alignas(64) int valid[16];
+        for (std::uint32_t i = 0; i < 16; ++i) valid[i] = -static_cast<int>(lanes >> i & 1);
+        embree::occluded(scene.scene(), call, valid, rays);
+    }
+    for (std::uint32_t i = 0; i < max_lanes; ++i) {
+        if (query.t[i] < 0 && (lanes >> i & 1) != 0) query.geometry[i] = query.primitive[i] = query.instance[i] = 0;
+        query.t[i] = t[i];
+    }
+}
+
+/// The long way for one lane, from behind `last` where there is one.
+void judge_lane(const RayScene& scene, RayQueryLanes& query, std::uint32_t lane, const RayCandidate* last) {
+    Call call(Call::Way::single, false, query, judge);
+    call.scene = &scene;
+    call.lane = lane;
+    query.candidate_count[lane] = query.next_candidate[lane] = query.has_more[lane] = 0;
+    RTCRayHit ray = single_ray(rays_of(query), lane);
+    if (last) {
+        call.has_last = true;
+        call.last = *last;
+        ray.ray.tnear = std::max(ray.ray.tnear, std::nextafter(last->t, 0.0f));
+    }
+    embree::intersect(scene.scene(), call, ray);
+    put_single_hit(rays_of(query), lane, ray);
+}
+
+/// Steps to the next candidate of a lane that is nearer than what is committed; false where there is none.
+bool next_candidate(RayQueryLanes& query, std::uint32_t lane) {
+    if (query.next_candidate[lane] >= query.candidate_count[lane]) return false;
+    const RayCandidate& candidate = query.candidates[lane][query.next_candidate[lane]];
+    if (!(candidate.t < query.t[lane])) {
+        // Neither this one nor those behind it count, nor what had no room.
+        query.has_more[lane] = 0;
+        query.candidate_count[lane] = 0;
+        return false;
+    }
+    ++query.next_candidate[lane];
+    query.candidate_t[lane] = candidate.t;
+    query.candidate_u[lane] = candidate.u, query.candidate_v[lane] = candidate.v;
+    for (int axis = 0; axis < 3; ++axis) query.candidate_normal[axis][lane] = candidate.normal[axis];
+    query.candidate_primitive[lane] = candidate.primitive;
+    query.candidate_geometry[lane] = candidate.geometry;
+    query.candidate_instance[lane] = candidate.instance;
+    return true;
+}
+
+/// First traversal of lanes of one scene.
+void traverse(const RayScene& scene, RayQueryLanes& query, std::uint32_t lanes, std::uint32_t hints) {
+    lanes = traceable(query, lanes);
+    std::uint32_t packet = 0, collecting = 0, single = 0, terminating = 0;
+    const bool has_candidates = scene.has_candidates(), has_overrides = scene.has_overrides();
+    for_each_lane(lanes, [&](std::uint32_t lane) {
+        const std::uint32_t flags = query.flags[lane], bit = 1u << lane;
+        if (flags & ray_skip_triangles) return;
+        query.candidate_count[lane] = query.next_candidate[lane] = query.has_more[lane] = 0;
+        if (flags & flags_against_packets) single |= bit;
+        else if ((flags & ray_opaque) || (!has_candidates && !has_overrides)) packet |= bit;
+        else if (has_overrides) single |= bit;
+        else collecting |= bit;
+        if (flags & ray_terminate_on_first_hit) terminating |= bit;
+    });
+    if (packet) {
+        Call call(Call::Way::all_count, are_coherent(query, packet), query);
+        if ((hints & ray_only_whether_hit) && (packet & ~terminating) == 0) find_whether_hit(scene, call, query, packet);
+        else intersect_lanes(scene, call, query, packet);
+    }
+    if (collecting) {
+        Call call(Call::Way::packet, are_coherent(query, collecting), query);
+        intersect_lanes(scene, call, query, collecting);
+        // Candidates do not shorten a ray, so the nearest ones of all were kept; what follows is found by single rays.
+    }
+    for_each_lane(single, [&](std::uint32_t lane) { judge_lane(scene, query, lane, nullptr); });
+}
+
+std::uint32_t proceed(RayQueryLanes* query_pointer, std::uint32_t live, std::uint32_t hints) {
+    RayQueryLanes& query = *query_pointer;
+    std::uint32_t fresh = 0, waiting = 0;
+    for (std::uint32_t i = 0; i < max_lanes; ++i) {
+        fresh |= std::uint32_t{query.status[i] == static_cast<std::uint32_t>(RayStatus::ready)} << i;
+        waiting |= std::uint32_t{query.status[i] == static_cast<std::uint32_t>(RayStatus::waiting)} << i;
+    }
+    fresh &= live;
+    waiting &= live;
+    std::uint32_t result = 0;
+
+    for (std::uint32_t rest = fresh; rest != 0;) {
+        const RayScene* scene = query.scene[std::countr_zero(rest)];
+        std::uint32_t same = 0;
+        for_each_lane(rest, [&](std::uint32_t lane) { same |= std::uint32_t{query.scene[lane] == scene} << lane; });
+        rest &= ~same;
+        const bool can_hit = scene && scene->scene();
+        if (can_hit) traverse(*scene, query, same, hints);
+        for_each_lane(same, [&](std::uint32_t lane) {
+            query.status[lane] = static_cast<std::uint32_t>(RayStatus::finished);
+        });
+        // Only where some geometry, instance or ray asks for it are there lists to look into.
+        std::uint32_t asking = can_hit ? same : 0;
+        for_each_lane(asking, [&](std::uint32_t lane) {
+            if ((query.flags[lane] & ray_no_opaque) == 0 && !scene->has_candidates()) asking &= ~(1u << lane);
+            if (query.flags[lane] & (ray_opaque | ray_skip_triangles)) asking &= ~(1u << lane);
+        });
+        waiting |= traceable(query, asking);
+    }
+
+    for_each_lane(waiting, [&](std::uint32_t lane) {
+        bool has_next = next_candidate(query, lane);
+        while (!has_next && query.has_more[lane] != 0) {
+            const RayCandidate last = query.candidates[lane][query.candidate_count[lane] - 1];
+            judge_lane(*query.scene[lane], query, lane, &last);
+            has_next = next_candidate(query, lane);
+        }
+        query.status[lane] = static_cast<std::uint32_t>(has_next ? RayStatus::waiting : RayStatus::finished);
+        if (has_next) result |= 1u << lane;
+    });
+    return result;
+}
+
+void confirm(RayQueryLanes* query_pointer, std::uint32_t live) {
+    RayQueryLanes& query = *query_pointer;
+    for_each_lane(live, [&](std::uint32_t lane) {
+        if (query.status[lane] != static_cast<std::uint32_t>(RayStatus::waiting)) return;
+        query.t[lane] = query.candidate_t[lane];
+        query.u[lane] = query.candidate_u[lane], query.v[lane] = query.candidate_v[lane];
+        for (int axis = 0; axis < 3; ++axis) query.normal[axis][lane] = query.candidate_normal[axis][lane];
+        query.primitive[lane] = query.candidate_primitive[lane];
+        query.geometry[lane] = query.candidate_geometry[lane];
+        query.instance[lane] = query.candidate_instance[lane];
+        query.kind[lane] = 1;
+        if (query.flags[lane] & ray_terminate_on_first_hit) query.status[lane] = static_cast<std::uint32_t>(RayStatus::finished);
+    });
+}
+
+}  // namespace
+
+void set_candidate_filter(RTCGeometryTy* geometry) {
+    rtcSetGeometryIntersectFilterFunction(geometry, collect);
+    rtcSetGeometryOccludedFilterFunction(geometry, collect);
+}
+
+RayProceedFunction ray_proceed_function() { return proceed; }
+RayConfirmFunction ray_confirm_function() { return confirm; }
+
+}  // namespace nacre::cpu
