@@ -27,6 +27,9 @@ struct ImageLevel {
     std::uint64_t slice_stride = 0, layer_stride = 0, sample_stride = 0;
 };
 
+/// Views whose texels compiled code fetches by itself: one sample, one channel of 32 bits, offsets below 2^31 bytes.
+enum class WordTexels : std::uint32_t { no, floating, integer };
+
 /// A part of a texture in one dimension and format. Levels count from the view's first mip, layers from its first layer.
 struct ImageView {
     rhi::Format format = rhi::Format::undefined;
@@ -35,6 +38,7 @@ struct ImageView {
     std::uint32_t layer_count = 0;   ///< Cubes: 6 for each cube. 3D: 1.
     std::uint32_t samples = 1;
     std::uint32_t texel_bytes = 0;   ///< Of a texel, or of a block.
+    WordTexels word_texels = WordTexels::no;
     std::array<ImageLevel, max_mips> levels{};
     std::array<ImageLevel, max_mips> stencil_levels{};
 };

@@ -95,6 +95,14 @@ ImageView CpuTexture::make_view(const rhi::ViewReference& reference) const {
         view.levels[mip] = part(whole_.levels[reference.base_mip + mip]);
         view.stencil_levels[mip] = part(whole_.stencil_levels[reference.base_mip + mip]);
     }
+    const bool is_integer = view.format == rhi::Format::r32_uint || view.format == rhi::Format::r32_sint;
+    const bool is_float = view.format == rhi::Format::r32_float || view.format == rhi::Format::d32_float ||
+                          view.format == rhi::Format::d32_float_s8_uint;
+    const ImageLevel& first = view.levels[0];
+    const std::uint64_t bytes = first.layer_stride * view.layer_count + first.slice_stride * first.depth +
+                                std::uint64_t{first.row_stride} * first.height;
+    if ((is_integer || is_float) && view.samples == 1 && bytes < (std::uint64_t{1} << 31))
+        view.word_texels = is_integer ? WordTexels::integer : WordTexels::floating;
     return view;
 }
 

@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <llvm/IR/Constants.h>
 
+#include <bit>
+
 #include "backends/cpu/compiler/emitter.h"
 #include "backends/cpu/image_view.h"
 
@@ -26,7 +28,8 @@ ImageOperands operands_from(const Instruction& at, std::size_t first) {
     const auto has = [&](spv::ImageOperandsShift shift) { return (bits >> static_cast<unsigned>(shift)) & 1; };
     if (has(spv::ImageOperandsShift::Bias)) found.bias = at.operand(next++);
     if (has(spv::ImageOperandsShift::Lod)) found.lod = at.operand(next++);
-    if (has(spv::ImageOperandsShift::Grad)) found.gradient_x = at.operand(next), found.gradient_y = at.operand(next + 1), next += 2;
+    if (has(spv::ImageOperandsShift::Grad))
+        found.gradient_x = at.operand(next), found.gradient_y = at.operand(next + 1), next += 2;
     if (has(spv::ImageOperandsShift::ConstOffset)) found.offset = at.operand(next++);
     if (has(spv::ImageOperandsShift::Offset)) found.offset = at.operand(next++);
     if (has(spv::ImageOperandsShift::ConstOffsets)) found.offsets = at.operand(next++);
@@ -37,8 +40,10 @@ ImageOperands operands_from(const Instruction& at, std::size_t first) {
 
 std::uint32_t dimensions_of(spv::Dim dim) {
     switch (dim) {
-        case spv::Dim::Dim1D: case spv::Dim::Buffer: return 1;
-        case spv::Dim::Dim3D: case spv::Dim::Cube: return 3;
+        case spv::Dim::Dim1D:
+        case spv::Dim::Buffer: return 1;
+        case spv::Dim::Dim3D:
+        case spv::Dim::Cube: return 3;
         default: return 2;
     }
 }
@@ -52,9 +57,12 @@ std::uint32_t Emitter::image_integer_flag(Id image_type) const {
 Component Emitter::from_word(const Component& word, llvm::Type* kind) {
     return apply({word}, [&](auto v) -> llvm::Value* {
         const bool is_vector = v[0]->getType()->isVectorTy();
-        const auto shaped = [&](llvm::Type* scalar) { return is_vector ? static_cast<llvm::Type*>(vector_of(scalar)) : scalar; };
+        const auto shaped = [&](llvm::Type* scalar) {
+            return is_vector ? static_cast<llvm::Type*>(vector_of(scalar)) : scalar;
+        };
         if (kind->isFloatTy()) return builder.CreateBitCast(v[0], shaped(kind));
-        if (kind->isHalfTy()) return math.convert_float(builder.CreateBitCast(v[0], shaped(builder.getFloatTy())), kind);
+        if (kind->isHalfTy())
+            return math.convert_float(builder.CreateBitCast(v[0], shaped(builder.getFloatTy())), kind);
         return builder.CreateZExtOrTrunc(v[0], shaped(kind));
     });
 }
@@ -63,9 +71,12 @@ Component Emitter::to_word(const Component& value) {
     return apply({value}, [&](auto v) -> llvm::Value* {
         llvm::Type* scalar = v[0]->getType()->getScalarType();
         const bool is_vector = v[0]->getType()->isVectorTy();
-        const auto shaped = [&](llvm::Type* kind) { return is_vector ? static_cast<llvm::Type*>(vector_of(kind)) : kind; };
+        const auto shaped = [&](llvm::Type* kind) {
+            return is_vector ? static_cast<llvm::Type*>(vector_of(kind)) : kind;
+        };
         if (scalar->isFloatTy()) return builder.CreateBitCast(v[0], shaped(builder.getInt32Ty()));
-        if (scalar->isHalfTy()) return builder.CreateBitCast(math.convert_float(v[0], builder.getFloatTy()), shaped(builder.getInt32Ty()));
+        if (scalar->isHalfTy())
+            return builder.CreateBitCast(math.convert_float(v[0], builder.getFloatTy()), shaped(builder.getInt32Ty()));
         return builder.CreateZExtOrTrunc(v[0], shaped(builder.getInt32Ty()));
     });
 }
@@ -76,12 +87,14 @@ void Emitter::put_argument(std::size_t offset, const Component& value) {
 }
 
 llvm::Value* Emitter::image_memory() {
-    if (!image_arguments) image_arguments = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), sizeof(ImageArguments)), "image");
+    if (!image_arguments)
+        image_arguments = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), sizeof(ImageArguments)), "image");
     return image_arguments;
 }
 
 void Emitter::set_image_atomic(AtomicOperation operation, const Component&, const Component& comparator) {
-    builder.CreateStore(int32(static_cast<std::int32_t>(operation)), at_offset(image_memory(), offsetof(ImageArguments, atomic)));
+    builder.CreateStore(int32(static_cast<std::int32_t>(operation)),
+                        at_offset(image_memory(), offsetof(ImageArguments, atomic)));
     if (comparator) put_argument(offsetof(ImageArguments, comparator), to_word(comparator));
 }
 
@@ -97,10 +110,13 @@ std::vector<Component> Emitter::image_call(const Component& image, const Compone
         put_argument(offsetof(ImageArguments, coordinates) + i * max_lanes * 4, to_word(coordinates[i]));
     for (std::size_t i = 0; i < texel.size() && i < 4; ++i)
         put_argument(offsetof(ImageArguments, texel) + i * max_lanes * 4, to_word(texel[i]));
-    if (sample) put_argument(offsetof(ImageArguments, sample), sample);
-    else if (type.multisampled) put_argument(offsetof(ImageArguments, sample), int32(0));
-    llvm::FunctionCallee function = external(function_symbol, builder.getVoidTy(),
-                                             {pointer_type, pointer_type, pointer_type, builder.getInt32Ty(), builder.getInt32Ty()});
+    if (sample)
+        put_argument(offsetof(ImageArguments, sample), sample);
+    else if (type.multisampled)
+        put_argument(offsetof(ImageArguments, sample), int32(0));
+    llvm::FunctionCallee function =
+        external(function_symbol, builder.getVoidTy(),
+                 {pointer_type, pointer_type, pointer_type, builder.getInt32Ty(), builder.getInt32Ty()});
     llvm::Value* lanes_on = writes ? effect_mask() : mask;
     const std::size_t results = operation == ImageOperation::store ? 0 : 4;
     const bool is_split = !image.is_uniform() || (sampler && !sampler.is_uniform());
@@ -112,28 +128,121 @@ std::vector<Component> Emitter::image_call(const Component& image, const Compone
         }
     std::vector<Component> values;
     for_each_different(image, lanes_on, [&](llvm::Value* one_image, llvm::Value* image_mask) {
-        for_each_different(sampler ? sampler : Component(one_image), image_mask, [&](llvm::Value* one_sampler, llvm::Value* both_mask) {
-            llvm::Value* view = invariant_load(pointer_type, at_offset(one_image, offsetof(Descriptor, image)), 8);
-            llvm::Value* state = sampler ? invariant_load(pointer_type, at_offset(one_sampler, offsetof(Descriptor, sampler)), 8)
-                                         : llvm::ConstantPointerNull::get(pointer_type);
-            builder.CreateCall(function, {view, state, image_memory(), int32(static_cast<std::int32_t>(flags)), mask_bits(both_mask)});
-            for (std::size_t i = 0; i < results; ++i) {
-                llvm::Value* words = builder.CreateAlignedLoad(
-                    vector_of(builder.getInt32Ty()), at_offset(image_memory(), static_cast<std::int64_t>(offsetof(ImageArguments, result) + i * max_lanes * 4)),
-                    llvm::Align(64));
-                if (is_split) {
-                    // Lanes that are not live come back as zero.
-                    llvm::Value* before = builder.CreateLoad(vector_of(builder.getInt32Ty()), gathered[i]);
-                    builder.CreateStore(builder.CreateOr(before, words), gathered[i]);
-                } else {
-                    values.emplace_back(words);
+        for_each_different(
+            sampler ? sampler : Component(one_image), image_mask,
+            [&](llvm::Value* one_sampler, llvm::Value* both_mask) {
+                llvm::Value* view = invariant_load(pointer_type, at_offset(one_image, offsetof(Descriptor, image)), 8);
+                llvm::Value* state =
+                    sampler ? invariant_load(pointer_type, at_offset(one_sampler, offsetof(Descriptor, sampler)), 8)
+                            : llvm::ConstantPointerNull::get(pointer_type);
+                builder.CreateCall(function, {view, state, image_memory(), int32(static_cast<std::int32_t>(flags)),
+                                              mask_bits(both_mask)});
+                for (std::size_t i = 0; i < results; ++i) {
+                    llvm::Value* words = builder.CreateAlignedLoad(
+                        vector_of(builder.getInt32Ty()),
+                        at_offset(image_memory(),
+                                  static_cast<std::int64_t>(offsetof(ImageArguments, result) + i * max_lanes * 4)),
+                        llvm::Align(64));
+                    if (is_split) {
+                        // Lanes that are not live come back as zero.
+                        llvm::Value* before = builder.CreateLoad(vector_of(builder.getInt32Ty()), gathered[i]);
+                        builder.CreateStore(builder.CreateOr(before, words), gathered[i]);
+                    } else {
+                        values.emplace_back(words);
+                    }
                 }
-            }
-        });
+            });
     });
     if (is_split)
-        for (llvm::AllocaInst* slot : gathered) values.emplace_back(builder.CreateLoad(vector_of(builder.getInt32Ty()), slot));
+        for (llvm::AllocaInst* slot : gathered)
+            values.emplace_back(builder.CreateLoad(vector_of(builder.getInt32Ty()), slot));
     return values;
+}
+
+llvm::Value* Emitter::bound_view(llvm::Value* descriptor_address) {
+    llvm::Value* view = invariant_load(pointer_type, at_offset(descriptor_address, offsetof(Descriptor, image)), 8);
+    // Nothing bound: the zeros of a view of nothing.
+    auto*& empty = shared_["empty_view"];
+    if (!empty) {
+        auto* bytes = llvm::ArrayType::get(builder.getInt64Ty(), (sizeof(ImageView) + 7) / 8);
+        empty = new llvm::GlobalVariable(target, bytes, true, llvm::GlobalValue::InternalLinkage,
+                                         llvm::Constant::getNullValue(bytes), "no_view");
+    }
+    return select(builder.CreateICmpNE(view, llvm::ConstantPointerNull::get(pointer_type)), view, empty);
+}
+
+/// texelFetch of views of single words, the hottest of all operations, without a call; `otherwise` makes the call for
+/// others.
+std::vector<Component> Emitter::fetch_words(const Component& image, Id image_type,
+                                            const std::vector<Component>& coordinates, const Component& level,
+                                            const std::function<std::vector<Component>()>& otherwise) {
+    const Type& type = module.type(image_type);
+    llvm::Type* word = builder.getInt32Ty();
+    llvm::Value* view = bound_view(image.value);
+    const bool is_integer = image_integer_flag(image_type) != 0;
+    const auto wanted = static_cast<std::int32_t>(is_integer ? WordTexels::integer : WordTexels::floating);
+    llvm::Value* kind = invariant_load(word, at_offset(view, offsetof(ImageView, word_texels)), 4);
+    llvm::Value* mips = invariant_load(word, at_offset(view, offsetof(ImageView, mip_count)), 4);
+    llvm::Value* is_direct =
+        builder.CreateAnd(builder.CreateICmpEQ(kind, int32(wanted)), builder.CreateICmpULT(level.value, mips));
+    llvm::BasicBlock* direct = llvm::BasicBlock::Create(context, "fetch_words", function_);
+    llvm::BasicBlock* call = llvm::BasicBlock::Create(context, "fetch_call", function_);
+    llvm::BasicBlock* after = llvm::BasicBlock::Create(context, "fetched", function_);
+    builder.CreateCondBr(is_direct, direct, call);
+
+    builder.SetInsertPoint(direct);
+    llvm::Value* levels = at_offset(view, offsetof(ImageView, levels));
+    llvm::Value* mip = builder.CreateGEP(
+        builder.getInt8Ty(), levels,
+        builder.CreateMul(builder.CreateZExt(level.value, builder.getInt64Ty()), int64(sizeof(ImageLevel))));
+    const auto member = [&](std::size_t offset) {
+        return invariant_load(word, at_offset(mip, static_cast<std::int64_t>(offset)), 4);
+    };
+    // Strides of views that are read here fit into 32 bits: their lower halves.
+    static_assert(std::endian::native == std::endian::little);
+    struct Axis {
+        llvm::Value *size, *stride;
+    };
+    std::vector<Axis> axes{{member(offsetof(ImageLevel, width)), int32(4)}};
+    const std::uint32_t dimensions = dimensions_of(type.dim);
+    if (dimensions > 1)
+        axes.push_back({member(offsetof(ImageLevel, height)), member(offsetof(ImageLevel, row_stride))});
+    if (dimensions > 2)
+        axes.push_back({member(offsetof(ImageLevel, depth)), member(offsetof(ImageLevel, slice_stride))});
+    if (type.arrayed)
+        axes.push_back({invariant_load(word, at_offset(view, offsetof(ImageView, layer_count)), 4),
+                        member(offsetof(ImageLevel, layer_stride))});
+    llvm::Value *inside = mask, *offset = nullptr;
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+        llvm::Value* at = widen(coordinates.at(i));
+        inside = both(inside, builder.CreateICmpULT(at, splat(axes[i].size)));
+        llvm::Value* step = builder.CreateMul(at, splat(axes[i].stride));
+        offset = offset ? builder.CreateAdd(offset, step) : step;
+    }
+    llvm::Value* data = invariant_load(pointer_type, at_offset(mip, offsetof(ImageLevel, data)), 8);
+    llvm::Type* words = vector_of(word);
+    llvm::Value* none = llvm::Constant::getNullValue(words);
+    llvm::Value* texels = builder.CreateMaskedGather(words, builder.CreateGEP(builder.getInt8Ty(), data, offset),
+                                                     llvm::Align(4), inside, none);
+    llvm::Value* one = splat(int32(is_integer ? 1 : std::bit_cast<std::int32_t>(1.0f)));
+    llvm::Value* alpha = select(inside, one, none);
+    llvm::BasicBlock* direct_end = builder.GetInsertBlock();
+    builder.CreateBr(after);
+
+    builder.SetInsertPoint(call);
+    const std::vector<Component> called = otherwise();
+    llvm::BasicBlock* call_end = builder.GetInsertBlock();
+    builder.CreateBr(after);
+
+    builder.SetInsertPoint(after);
+    std::vector<Component> result;
+    for (std::size_t i = 0; i < 4; ++i) {
+        llvm::PHINode* either = builder.CreatePHI(words, 2);
+        either->addIncoming(i == 0 ? texels : i == 3 ? alpha : none, direct_end);
+        either->addIncoming(called.at(i).value, call_end);
+        result.emplace_back(either);
+    }
+    return result;
 }
 
 bool Emitter::emit_image(const Instruction& at) {
@@ -172,8 +281,10 @@ bool Emitter::emit_image(const Instruction& at) {
             finish_definition(at.result);
             return true;
         }
-        case Op::OpImageQuerySize: case Op::OpImageQuerySizeLod: case Op::OpImageQueryLevels: case Op::OpImageQuerySamples:
-            return emit_image_query(at);
+        case Op::OpImageQuerySize:
+        case Op::OpImageQuerySizeLod:
+        case Op::OpImageQueryLevels:
+        case Op::OpImageQuerySamples: return emit_image_query(at);
         default: break;
     }
 
@@ -210,14 +321,16 @@ bool Emitter::emit_image(const Instruction& at) {
     const bool has_quads = module.model == spv::ExecutionModel::Fragment;
     const auto to_float = [&](const Component& value) {
         return apply({value}, [&](auto v) {
-            return v[0]->getType()->getScalarType()->isFloatTy() ? v[0] : math.convert_float(v[0], builder.getFloatTy());
+            return v[0]->getType()->getScalarType()->isFloatTy() ? v[0]
+                                                                 : math.convert_float(v[0], builder.getFloatTy());
         });
     };
     for (Component& coordinate : coordinates)
         if (coordinate.value->getType()->getScalarType()->isFloatingPointTy()) coordinate = to_float(coordinate);
     if (is_projected)
         for (std::uint32_t i = 0; i < dimensions; ++i)
-            coordinates[i] = apply({coordinates[i], coordinates.at(dimensions)}, [&](auto v) { return builder.CreateFDiv(v[0], v[1]); });
+            coordinates[i] = apply({coordinates[i], coordinates.at(dimensions)},
+                                   [&](auto v) { return builder.CreateFDiv(v[0], v[1]); });
     const auto put_lod = [&](Id id) { put_argument(offsetof(ImageArguments, lod), to_float(get_scalar(id))); };
     if (operation == ImageOperation::sample || operation == ImageOperation::query_lod) {
         if (more.gradient_x) {
@@ -232,17 +345,22 @@ bool Emitter::emit_image(const Instruction& at) {
             put_lod(more.lod);
         } else if (is_implicit && !has_quads) {
             flags |= image_lod_explicit;
-            if (more.bias) put_lod(more.bias);
-            else put_argument(offsetof(ImageArguments, lod), Component(llvm::ConstantFP::get(builder.getFloatTy(), 0)));
+            if (more.bias)
+                put_lod(more.bias);
+            else
+                put_argument(offsetof(ImageArguments, lod), Component(llvm::ConstantFP::get(builder.getFloatTy(), 0)));
         } else {
             flags |= image_lod_implicit;
-            if (more.bias) put_lod(more.bias);
-            else put_argument(offsetof(ImageArguments, lod), Component(llvm::ConstantFP::get(builder.getFloatTy(), 0)));
+            if (more.bias)
+                put_lod(more.bias);
+            else
+                put_argument(offsetof(ImageArguments, lod), Component(llvm::ConstantFP::get(builder.getFloatTy(), 0)));
         }
-        if (more.min_lod) flags |= image_min_lod, put_argument(offsetof(ImageArguments, min_lod), to_float(get_scalar(more.min_lod)));
+        if (more.min_lod)
+            flags |= image_min_lod, put_argument(offsetof(ImageArguments, min_lod), to_float(get_scalar(more.min_lod)));
     }
+    Component level = int32(0);
     if (operation == ImageOperation::fetch || operation == ImageOperation::load) {
-        Component level = int32(0);
         if (more.lod) level = get_scalar(more.lod);
         put_argument(offsetof(ImageArguments, lod), level);
     }
@@ -262,15 +380,26 @@ bool Emitter::emit_image(const Instruction& at) {
         flags |= image_offsets;
         const Value offsets = get(more.offsets);
         for (std::size_t i = 0; i < 8 && i < offsets.components.size(); ++i)
-            builder.CreateStore(offsets.components[i].value, at_offset(image_memory(), static_cast<std::int64_t>(offsetof(ImageArguments, gather_offsets) + i * 4)));
+            builder.CreateStore(
+                offsets.components[i].value,
+                at_offset(image_memory(), static_cast<std::int64_t>(offsetof(ImageArguments, gather_offsets) + i * 4)));
     }
     Component sample;
     if (more.sample) sample = get_scalar(more.sample);
     std::vector<Component> texel;
     if (operation == ImageOperation::store) texel = get(at.operand(2)).components;
-    const bool needs_sampler = operation == ImageOperation::sample || operation == ImageOperation::gather || operation == ImageOperation::query_lod;
+    const bool needs_sampler = operation == ImageOperation::sample || operation == ImageOperation::gather ||
+                               operation == ImageOperation::query_lod;
+    const auto call = [&] {
+        return image_call(image.image, needs_sampler ? image.sampler : Component(), image.image_type, coordinates,
+                          flags, texel, sample);
+    };
+    const bool may_be_words = operation == ImageOperation::fetch && image.image.is_uniform() && level.is_uniform() &&
+                              !more.offset && !type.multisampled && type.dim != spv::Dim::Cube &&
+                              level.value->getType()->isIntegerTy(32) &&
+                              coordinates.at(0).value->getType()->getScalarType()->isIntegerTy(32);
     const std::vector<Component> words =
-        image_call(image.image, needs_sampler ? image.sampler : Component(), image.image_type, coordinates, flags, texel, sample);
+        may_be_words ? fetch_words(image.image, image.image_type, coordinates, level, call) : call();
     if (at.result) set(at, make_texel(words, at.type));
     return true;
 }
@@ -282,33 +411,29 @@ bool Emitter::emit_image_query(const Instruction& at) {
     // Sizes are read by lane where the image differs from lane to lane.
     const auto read = [&](std::size_t offset, const Component& level) -> Component {
         const auto one = [&](llvm::Value* descriptor_address, llvm::Value* level_number) -> llvm::Value* {
-            llvm::Value* view = invariant_load(pointer_type, at_offset(descriptor_address, offsetof(Descriptor, image)), 8);
-            llvm::Value* is_bound = builder.CreateICmpNE(view, llvm::ConstantPointerNull::get(pointer_type));
-            // Nothing bound: the zeros of a view of nothing.
-            auto*& empty = shared_["empty_view"];
-            if (!empty) {
-                auto* bytes = llvm::ArrayType::get(builder.getInt64Ty(), (sizeof(ImageView) + 7) / 8);
-                empty = new llvm::GlobalVariable(target, bytes, true, llvm::GlobalValue::InternalLinkage, llvm::Constant::getNullValue(bytes), "no_view");
-            }
-            view = select(is_bound, view, empty);
+            llvm::Value* view = bound_view(descriptor_address);
             llvm::Value* address = at_offset(view, static_cast<std::int64_t>(offset));
             if (level_number) {
                 llvm::Value* mips = invariant_load(word, at_offset(view, offsetof(ImageView, mip_count)), 4);
                 llvm::Value* exists = builder.CreateICmpULT(level_number, mips);
                 llvm::Value* safe = select(exists, level_number, int32(0));
-                address = builder.CreateGEP(builder.getInt8Ty(), address,
-                                            builder.CreateMul(builder.CreateZExt(safe, builder.getInt64Ty()), int64(sizeof(ImageLevel))));
+                address = builder.CreateGEP(
+                    builder.getInt8Ty(), address,
+                    builder.CreateMul(builder.CreateZExt(safe, builder.getInt64Ty()), int64(sizeof(ImageLevel))));
                 return select(exists, invariant_load(word, address, 4), int32(0));
             }
             return invariant_load(word, address, 4);
         };
-        if (from.image.is_uniform() && (!level || level.is_uniform())) return one(from.image.value, level ? level.value : nullptr);
+        if (from.image.is_uniform() && (!level || level.is_uniform()))
+            return one(from.image.value, level ? level.value : nullptr);
         llvm::AllocaInst* result = make_slot(vector_of(word), "size");
         builder.CreateStore(llvm::Constant::getNullValue(vector_of(word)), result);
         llvm::Value *images = widen(from.image), *levels = level ? widen(level) : nullptr;
         for_each_lane(mask, [&](llvm::Value* lane) {
-            llvm::Value* value = one(builder.CreateExtractElement(images, lane), levels ? builder.CreateExtractElement(levels, lane) : nullptr);
-            builder.CreateStore(builder.CreateInsertElement(builder.CreateLoad(vector_of(word), result), value, lane), result);
+            llvm::Value* value = one(builder.CreateExtractElement(images, lane),
+                                     levels ? builder.CreateExtractElement(levels, lane) : nullptr);
+            builder.CreateStore(builder.CreateInsertElement(builder.CreateLoad(vector_of(word), result), value, lane),
+                                result);
         });
         return Component(builder.CreateLoad(vector_of(word), result));
     };
@@ -320,19 +445,24 @@ bool Emitter::emit_image_query(const Instruction& at) {
     } else {
         const Component level = at.op == Op::OpImageQuerySizeLod ? get_scalar(at.operand(1)) : Component(int32(0));
         const std::uint32_t dimensions = type.dim == spv::Dim::Cube ? 2 : dimensions_of(type.dim);
-        const std::array<std::size_t, 3> offsets{offsetof(ImageLevel, width), offsetof(ImageLevel, height), offsetof(ImageLevel, depth)};
-        for (std::uint32_t i = 0; i < dimensions; ++i) values.push_back(read(offsetof(ImageView, levels) + offsets[i], level));
+        const std::array<std::size_t, 3> offsets{offsetof(ImageLevel, width), offsetof(ImageLevel, height),
+                                                 offsetof(ImageLevel, depth)};
+        for (std::uint32_t i = 0; i < dimensions; ++i)
+            values.push_back(read(offsetof(ImageView, levels) + offsets[i], level));
         if (type.arrayed) {
             Component layers = read(offsetof(ImageView, layer_count), {});
             if (type.dim == spv::Dim::Cube)
-                layers = apply({layers}, [&](auto v) { return builder.CreateUDiv(v[0], llvm::ConstantInt::get(v[0]->getType(), 6)); });
+                layers = apply({layers}, [&](auto v) {
+                    return builder.CreateUDiv(v[0], llvm::ConstantInt::get(v[0]->getType(), 6));
+                });
             values.push_back(layers);
         }
     }
     llvm::Type* kind = scalar_type(module.type(component_type(at.type, 0)));
     for (Component& value : values)
         value = apply({value}, [&](auto v) {
-            return builder.CreateZExtOrTrunc(v[0], v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(kind)) : kind);
+            return builder.CreateZExtOrTrunc(
+                v[0], v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(kind)) : kind);
         });
     set(at, std::move(values));
     return true;

@@ -187,6 +187,9 @@ class Emitter {
     std::vector<Component> image_call(const Component& image, const Component& sampler, Id image_type,
                                       const std::vector<Component>& coordinates, std::uint32_t flags,
                                       const std::vector<Component>& texel, const Component& sample);
+    llvm::Value* bound_view(llvm::Value* descriptor_address);           ///< ptr to ImageView; to zeros where nothing is bound.
+    std::vector<Component> fetch_words(const Component& image, Id image_type, const std::vector<Component>& coordinates,
+                                       const Component& level, const std::function<std::vector<Component>()>& otherwise);
     void put_argument(std::size_t offset, const Component& value);
     llvm::Value* image_memory();                                        ///< An ImageArguments on the stack.
     void set_image_atomic(AtomicOperation operation, const Component& value, const Component& comparator);
