@@ -20,7 +20,8 @@ install(EXPORT nacre-targets NAMESPACE nacre:: DESTINATION "${package_dir}")
 set(public_headers
   core/disk_cache.h core/dynamic_library.h core/embedded_file.h core/error.h core/file.h core/hash.h core/image.h
   core/log.h core/progress.h core/srgb.h
-  rhi/backend.h rhi/capabilities.h rhi/command_list.h rhi/command_stream.h rhi/device.h rhi/format.h rhi/handle.h
+  rhi/acceleration_structure.h rhi/backend.h rhi/capabilities.h rhi/command_list.h rhi/command_stream.h rhi/device.h
+  rhi/format.h rhi/handle.h
   rhi/pipeline.h rhi/pipeline_reloader.h rhi/reflection.h rhi/resources.h rhi/shader_compiler.h rhi/texture_table.h
   rhi/validation.h
   materials/description.h materials/single_slab.h
