@@ -93,10 +93,16 @@ void launch(Worker& worker, bool has_vulkan) {
 
 bool has_vulkan_device() {
     // In a process of its own: no driver is loaded here.
+    constexpr int absent = 1, broken = 2;
     const pid_t process = fork();
-    if (process == 0) _exit(DeviceRunner::create("vulkan") ? 0 : 1);
+    if (process == 0) {
+        const auto runner = DeviceRunner::create("vulkan");
+        _exit(runner ? 0 : runner.error().code == ErrorCode::not_found ? absent : broken);
+    }
     int status = 0;
     waitpid(process, &status, 0);
+    const bool is_known = WIFEXITED(status) && (WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == absent);
+    EXPECT_TRUE(is_known) << "there is a Vulkan driver, but no device can be made";
     return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 

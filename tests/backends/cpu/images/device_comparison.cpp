@@ -41,7 +41,7 @@ Oracle::Oracle() {
     if (made)
         device_ = std::move(*made);
     else
-        reason_ = made.error().message();
+        error_ = made.error();
 }
 Oracle::~Oracle() = default;
 

@@ -18,9 +18,9 @@ class Oracle {
     /// A device whose driver filters as the specification says (Mesa's software driver approximates by default).
     Oracle();
     ~Oracle();
-    /// Null where this machine has none; `reason` tells why.
+    /// Null where none could be made; `error` tells why (not_found: this machine has none).
     [[nodiscard]] rhi::Device* device() const { return device_.get(); }
-    [[nodiscard]] const std::string& reason() const { return reason_; }
+    [[nodiscard]] const Error& error() const { return error_; }
 
     /// Evaluates a GLSL expression of type vec4, ivec4 or uvec4 for all points. The expression sees `image` (of the
     /// fitting sampler type), and of each point `p` (vec4 of coordinates), `ip` (the same bits as ivec4), `lod`,
@@ -31,7 +31,7 @@ class Oracle {
   private:
     std::unique_ptr<rhi::Instance> instance_;
     std::unique_ptr<rhi::Device> device_;
-    std::string reason_;
+    Error error_;
 };
 
 /// GLSL name of a sampler type, e.g. "isamplerCubeArray".
