@@ -343,7 +343,7 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
             llvm::Type* kind = scalar_type(to);
             std::vector<Component> made;
             const auto cast = [&](llvm::Value* x, llvm::Type* scalar) {
-                return builder.CreateBitCast(x, x->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(scalar)) : scalar);
+                return builder.CreateBitCast(x, like(x, scalar));
             };
             if (source.bits == to.bits) {
                 for (const Component& x : from.components) {
@@ -362,7 +362,7 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
                         Component part = apply({from.components[i + k]}, [&](Values v) {
                             llvm::Value* bits = cast(v[0], builder.getIntNTy(source.bits));
                             llvm::Type* wide = builder.getIntNTy(to.bits);
-                            bits = builder.CreateZExt(bits, bits->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(wide)) : wide);
+                            bits = builder.CreateZExt(bits, like(bits, wide));
                             return k ? builder.CreateShl(bits, k * source.bits) : bits;
                         });
                         whole = whole ? apply({whole, part}, [&](Values v) { return builder.CreateOr(v[0], v[1]); }) : part;
@@ -377,14 +377,12 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
                             llvm::Value* bits = cast(v[0], builder.getIntNTy(source.bits));
                             if (k) bits = builder.CreateLShr(bits, k * to.bits);
                             llvm::Type* narrow_type = builder.getIntNTy(to.bits);
-                            bits = builder.CreateTrunc(bits, bits->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(narrow_type)) : narrow_type);
+                            bits = builder.CreateTrunc(bits, like(bits, narrow_type));
                             return cast(bits, kind);
                         }));
             }
             return made;
         }
-        // In specialization constants these come as operations.
-        case Op::OpCompositeExtract: case Op::OpCompositeInsert: case Op::OpVectorShuffle:
         default: return {};
     }
 }

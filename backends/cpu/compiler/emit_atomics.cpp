@@ -95,7 +95,7 @@ bool Emitter::emit_atomic(const Instruction& at) {
             if (is_load) set(at, {from_word(texel.at(0), kind)});
             return true;
         }
-        set_image_atomic(image_operation, value, comparator);
+        set_image_atomic(image_operation, comparator);
         const std::vector<Component> old =
             image_call(pointer.image_descriptor, Component(), pointer.image_type, pointer.coordinates,
                        static_cast<std::uint32_t>(ImageOperation::atomic) | image_integer_flag(pointer.image_type), {value}, pointer.sample);

@@ -189,7 +189,7 @@ bool Emitter::emit_extended(const Instruction& at) {
                 for (Component& exponent : second)
                     exponent = apply({exponent}, [&](Values v) {
                         llvm::Type* kind = scalar_type(scalar);
-                        return builder.CreateSExtOrTrunc(v[0], v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(kind)) : kind);
+                        return builder.CreateSExtOrTrunc(v[0], like(v[0], kind));
                     });
             if (is_struct) {
                 first.insert(first.end(), second.begin(), second.end());

@@ -56,28 +56,20 @@ std::uint32_t Emitter::image_integer_flag(Id image_type) const {
 
 Component Emitter::from_word(const Component& word, llvm::Type* kind) {
     return apply({word}, [&](auto v) -> llvm::Value* {
-        const bool is_vector = v[0]->getType()->isVectorTy();
-        const auto shaped = [&](llvm::Type* scalar) {
-            return is_vector ? static_cast<llvm::Type*>(vector_of(scalar)) : scalar;
-        };
-        if (kind->isFloatTy()) return builder.CreateBitCast(v[0], shaped(kind));
+        if (kind->isFloatTy()) return builder.CreateBitCast(v[0], like(v[0], kind));
         if (kind->isHalfTy())
-            return math.convert_float(builder.CreateBitCast(v[0], shaped(builder.getFloatTy())), kind);
-        return builder.CreateZExtOrTrunc(v[0], shaped(kind));
+            return math.convert_float(builder.CreateBitCast(v[0], like(v[0], builder.getFloatTy())), kind);
+        return builder.CreateZExtOrTrunc(v[0], like(v[0], kind));
     });
 }
 
 Component Emitter::to_word(const Component& value) {
     return apply({value}, [&](auto v) -> llvm::Value* {
         llvm::Type* scalar = v[0]->getType()->getScalarType();
-        const bool is_vector = v[0]->getType()->isVectorTy();
-        const auto shaped = [&](llvm::Type* kind) {
-            return is_vector ? static_cast<llvm::Type*>(vector_of(kind)) : kind;
-        };
-        if (scalar->isFloatTy()) return builder.CreateBitCast(v[0], shaped(builder.getInt32Ty()));
+        if (scalar->isFloatTy()) return builder.CreateBitCast(v[0], like(v[0], builder.getInt32Ty()));
         if (scalar->isHalfTy())
-            return builder.CreateBitCast(math.convert_float(v[0], builder.getFloatTy()), shaped(builder.getInt32Ty()));
-        return builder.CreateZExtOrTrunc(v[0], shaped(builder.getInt32Ty()));
+            return builder.CreateBitCast(math.convert_float(v[0], builder.getFloatTy()), like(v[0], builder.getInt32Ty()));
+        return builder.CreateZExtOrTrunc(v[0], like(v[0], builder.getInt32Ty()));
     });
 }
 
@@ -92,7 +84,7 @@ llvm::Value* Emitter::image_memory() {
     return image_arguments;
 }
 
-void Emitter::set_image_atomic(AtomicOperation operation, const Component&, const Component& comparator) {
+void Emitter::set_image_atomic(AtomicOperation operation, const Component& comparator) {
     builder.CreateStore(int32(static_cast<std::int32_t>(operation)),
                         at_offset(image_memory(), offsetof(ImageArguments, atomic)));
     if (comparator) put_argument(offsetof(ImageArguments, comparator), to_word(comparator));
@@ -462,7 +454,7 @@ bool Emitter::emit_image_query(const Instruction& at) {
     for (Component& value : values)
         value = apply({value}, [&](auto v) {
             return builder.CreateZExtOrTrunc(
-                v[0], v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(kind)) : kind);
+                v[0], like(v[0], kind));
         });
     set(at, std::move(values));
     return true;

@@ -36,13 +36,12 @@ LaneVariable& Emitter::make_lane_variable(Id variable_id, Id type_id, bool is_un
     return *made;
 }
 
-void Emitter::fill(LaneVariable& variable, const std::vector<Component>& values, llvm::Value*) {
+void Emitter::fill(LaneVariable& variable, const std::vector<Component>& values) {
     std::uint32_t index = 0;
     for (const Component& component : values) {
         llvm::Value* value = component.value;
         if (value->getType()->getScalarType()->isIntegerTy(1))
-            value = builder.CreateZExt(value, value->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt32Ty()))
-                                                                             : builder.getInt32Ty());
+            value = builder.CreateZExt(value, like(value, builder.getInt32Ty()));
         if (!variable.is_uniform) value = widen(Component(value));
         const std::uint64_t at = std::uint64_t{index++} * variable.slot_bytes * (variable.is_uniform ? 1 : lanes);
         builder.CreateAlignedStore(value, at_offset(variable.memory, static_cast<std::int64_t>(at)), llvm::Align(variable.slot_bytes));
@@ -164,7 +163,7 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
             Component index = get_scalar(index_id);
             if (index.value->getType()->getScalarSizeInBits() != 32)
                 index = apply({index}, [&](auto v) {
-                    return builder.CreateZExtOrTrunc(v[0], v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt32Ty())) : builder.getInt32Ty());
+                    return builder.CreateZExtOrTrunc(v[0], like(v[0], builder.getInt32Ty()));
                 });
             if (pointer.descriptor_index) reject("arrays of arrays of resources are not supported");
             pointer.descriptor_index = index;
@@ -226,7 +225,7 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
         // Wide indices that do not fit stay out of range.
         const bool is_signed = module.type(module.type_of(index_id)).is_signed;
         index = apply({index}, [&](auto v) {
-            llvm::Type* kind = v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt32Ty())) : builder.getInt32Ty();
+            llvm::Type* kind = like(v[0], builder.getInt32Ty());
             if (bits < 32) return is_signed ? builder.CreateSExt(v[0], kind) : builder.CreateZExt(v[0], kind);
             llvm::Value* fits = builder.CreateICmpULE(v[0], llvm::ConstantInt::get(v[0]->getType(), 0x7fffffff));
             return builder.CreateSelect(fits, builder.CreateTrunc(v[0], kind), llvm::ConstantInt::get(kind, 0x7fffffff));
@@ -239,7 +238,7 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
             llvm::Value* begin = llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(pointer.offset));
             llvm::Value* room = builder.CreateSelect(builder.CreateICmpUGE(v[0], begin), builder.CreateSub(v[0], begin),
                                                      llvm::Constant::getNullValue(v[0]->getType()));
-            llvm::Type* kind = v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt32Ty())) : builder.getInt32Ty();
+            llvm::Type* kind = like(v[0], builder.getInt32Ty());
             return builder.CreateTrunc(builder.CreateUDiv(room, llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(std::max<std::int64_t>(step, 1)))), kind);
         });
     }
@@ -328,7 +327,7 @@ void Emitter::store_bytes(const Pointer& pointer, std::int64_t extra, const Type
     Component stored = value;
     if (is_boolean)
         stored = apply({value}, [&](auto v) {
-            return builder.CreateZExt(v[0], v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt32Ty())) : builder.getInt32Ty());
+            return builder.CreateZExt(v[0], like(v[0], builder.getInt32Ty()));
         });
     llvm::Value* lanes_on = both(effect_mask(), ok ? ok.value : nullptr);
     if (!address->getType()->isVectorTy()) {
@@ -383,7 +382,7 @@ Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t ind
         const Type& type = module.type(variable.type);
         spilled.slot_bytes = type.has_wide ? 8 : 4;
         spilled.memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * spilled.slot_bytes * lanes), "input");
-        fill(spilled, variable.components, mask);
+        fill(spilled, variable.components);
         Pointer through = pointer;
         through.variable = &spilled;
         spilled.type = variable.type;
@@ -420,7 +419,7 @@ void Emitter::store_lane_component(const Pointer& pointer, std::uint32_t index, 
     Component stored = value;
     if (is_boolean)
         stored = apply({value}, [&](auto v) {
-            return builder.CreateZExt(v[0], v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(kind)) : kind);
+            return builder.CreateZExt(v[0], like(v[0], kind));
         });
     const std::uint32_t per_lane = variable.is_uniform ? 1 : lanes;
     llvm::Type* held = variable.is_uniform ? kind : static_cast<llvm::Type*>(vector_of(kind));
@@ -566,7 +565,7 @@ void Emitter::declare_variables() {
         if (variable.initializer) initial = get(variable.initializer).components;
         else if (module.type(variable.type).components <= most_direct_components)
             for_each_component_type(variable.type, [&](const Type& scalar) { initial.push_back(zero(scalar)); });
-        fill(made, initial, all_lanes());
+        fill(made, initial);
     }
 }
 
@@ -586,7 +585,7 @@ bool Emitter::emit_memory(const Instruction& at) {
                 // In loops and repeated calls: not what an earlier round left there.
                 std::vector<Component> initial;
                 for_each_component_type(variable.type, [&](const Type& scalar) { initial.push_back(zero(scalar)); });
-                if (frame->function == &module.entry()) fill(variable, initial, mask);
+                if (frame->function == &module.entry()) fill(variable, initial);
             }
             return true;
         }
@@ -626,7 +625,7 @@ bool Emitter::emit_memory(const Instruction& at) {
                     llvm::Value* room = builder.CreateSelect(builder.CreateICmpUGE(v[0], first), builder.CreateSub(v[0], first),
                                                              llvm::Constant::getNullValue(v[0]->getType()));
                     llvm::Value* count = builder.CreateUDiv(room, llvm::ConstantInt::get(v[0]->getType(), stride));
-                    return builder.CreateTrunc(count, v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt32Ty())) : builder.getInt32Ty());
+                    return builder.CreateTrunc(count, like(v[0], builder.getInt32Ty()));
                 })});
             return true;
         }

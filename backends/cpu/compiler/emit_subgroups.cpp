@@ -39,7 +39,6 @@ llvm::Value* Emitter::permute(llvm::Value* values, llvm::Value* sources) {
 
 bool Emitter::emit_subgroup(const Instruction& at) {
     const auto operand_value = [&](std::size_t i) { return get(at.operand(i)); };
-    const auto word_type = [&]() -> llvm::Type* { return builder.getInt32Ty(); };
     // A ballot is four words; only the first has lanes.
     const auto ballot = [&](llvm::Value* lanes_on) {
         return std::vector<Component>{Component(mask_bits(lanes_on)), Component(int32(0)), Component(int32(0)), Component(int32(0))};
@@ -50,7 +49,7 @@ bool Emitter::emit_subgroup(const Instruction& at) {
     };
     const auto one_lane = [&](const Component& value, llvm::Value* lane) -> Component {
         if (value.is_uniform()) return value;
-        llvm::Value* inside = builder.CreateAnd(builder.CreateZExtOrTrunc(lane, word_type()), int32(lanes - 1));
+        llvm::Value* inside = builder.CreateAnd(builder.CreateZExtOrTrunc(lane, builder.getInt32Ty()), int32(lanes - 1));
         return Component(builder.CreateExtractElement(value.value, inside));
     };
 
@@ -142,7 +141,7 @@ bool Emitter::emit_subgroup(const Instruction& at) {
         case Op::OpGroupNonUniformShuffleDown: case Op::OpGroupNonUniformQuadBroadcast: case Op::OpGroupNonUniformQuadSwap: {
             llvm::Value* operand = nullptr;
             if (at.op != Op::OpGroupNonUniformQuadSwap || !module.constant_word(at.operand(2)))
-                operand = builder.CreateZExtOrTrunc(widen(get_scalar(at.operand(2))), vector_of(word_type()));
+                operand = builder.CreateZExtOrTrunc(widen(get_scalar(at.operand(2))), vector_of(builder.getInt32Ty()));
             else
                 operand = splat(int32(static_cast<std::int64_t>(*module.constant_word(at.operand(2)))));
             llvm::Value* numbers = lane_numbers();

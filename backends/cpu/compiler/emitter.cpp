@@ -201,4 +201,36 @@ llvm::Value* Emitter::load_context(std::size_t offset, llvm::Type* type) {
                           type->isPointerTy() ? 8 : 4);
 }
 
+llvm::Type* Emitter::like(llvm::Value* shape, llvm::Type* scalar) {
+    return shape->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(scalar)) : scalar;
+}
+
+void Emitter::emit_batches(std::uint32_t pointers, std::size_t batch_bytes, const std::function<void(llvm::Value* batch)>& body) {
+    std::vector<llvm::Type*> arguments(pointers, pointer_type);
+    arguments.push_back(builder.getInt32Ty());
+    auto* type = llvm::FunctionType::get(builder.getVoidTy(), arguments, false);
+    function_ = llvm::Function::Create(type, llvm::Function::ExternalLinkage, "kernel", target);
+    shader_context = function_->getArg(0);
+    llvm::Value *batches = function_->getArg(pointers - 1), *count = function_->getArg(pointers);
+    slot_block = llvm::BasicBlock::Create(context, "slots", function_);
+    llvm::BasicBlock* start = llvm::BasicBlock::Create(context, "start", function_);
+    llvm::BasicBlock* loop = llvm::BasicBlock::Create(context, "batch", function_);
+    llvm::BasicBlock* done = llvm::BasicBlock::Create(context, "done", function_);
+    builder.SetInsertPoint(start);
+    builder.CreateCondBr(builder.CreateICmpNE(count, int32(0)), loop, done);
+    builder.SetInsertPoint(loop);
+    llvm::PHINode* number = builder.CreatePHI(builder.getInt32Ty(), 2, "batch");
+    number->addIncoming(int32(0), start);
+    body(builder.CreateGEP(builder.getInt8Ty(), batches,
+                           builder.CreateMul(builder.CreateZExt(number, builder.getInt64Ty()),
+                                             int64(static_cast<std::int64_t>(batch_bytes)))));
+    llvm::Value* next = builder.CreateAdd(number, int32(1));
+    number->addIncoming(next, builder.GetInsertBlock());
+    builder.CreateCondBr(builder.CreateICmpULT(next, count), loop, done);
+    builder.SetInsertPoint(done);
+    builder.CreateRetVoid();
+    builder.SetInsertPoint(slot_block);
+    builder.CreateBr(start);
+}
+
 }  // namespace nacre::cpu

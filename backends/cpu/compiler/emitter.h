@@ -126,6 +126,11 @@ class Emitter {
     // ---- Types and small parts (emitter.cpp)
     [[nodiscard]] llvm::Type* scalar_type(const Type& type);
     [[nodiscard]] llvm::Type* vector_of(llvm::Type* scalar) { return llvm::FixedVectorType::get(scalar, lanes); }
+    /// `scalar`, or a vector of it where `shape` is a vector.
+    llvm::Type* like(llvm::Value* shape, llvm::Type* scalar);
+    /// Makes the function `kernel(pointers..., count)` that runs `body` for each of `count` batches; the first pointer is the
+    /// context, the last the batches.
+    void emit_batches(std::uint32_t pointers, std::size_t batch_bytes, const std::function<void(llvm::Value* batch)>& body);
     /// Id of the scalar type of component `index` of a value of type `type`.
     [[nodiscard]] Id component_type(Id type, std::uint32_t index) const;
     void for_each_component_type(Id type, const std::function<void(const Type&)>& visit) const;
@@ -192,7 +197,7 @@ class Emitter {
                                        const Component& level, const std::function<std::vector<Component>()>& otherwise);
     void put_argument(std::size_t offset, const Component& value);
     llvm::Value* image_memory();                                        ///< An ImageArguments on the stack.
-    void set_image_atomic(AtomicOperation operation, const Component& value, const Component& comparator);
+    void set_image_atomic(AtomicOperation operation, const Component& comparator);
     [[nodiscard]] std::uint32_t image_integer_flag(Id image_type) const;
     Component from_word(const Component& word, llvm::Type* kind);       ///< Bits of 32 as a value of a type.
     Component to_word(const Component& value);
@@ -212,7 +217,7 @@ class Emitter {
     // ---- Memory (emit_memory.cpp)
     void declare_variables();
     LaneVariable& make_lane_variable(Id variable_id, Id type, bool is_uniform);
-    void fill(LaneVariable& variable, const std::vector<Component>& values, llvm::Value* mask);
+    void fill(LaneVariable& variable, const std::vector<Component>& values);
     std::vector<Component> load(const Pointer& pointer);
     void store(const Pointer& pointer, const std::vector<Component>& values);
     Pointer pointer_to(Id variable);
@@ -277,7 +282,6 @@ class Emitter {
             llvm::AllocaInst* back_mask = nullptr;
             std::vector<std::vector<llvm::AllocaInst*>> phi_slots;
             std::vector<bool> phi_uniform;
-            bool stored_phis = false;
             bool reconverges = false;     ///< Header: all lanes meet again at the merge block.
             bool is_reconverged = false;  ///< Merge block of such a header.
             std::uint32_t divergent_loop = ~0u;  ///< Innermost loop around it that lanes leave one by one: header's index.
@@ -291,7 +295,6 @@ class Emitter {
             std::uint32_t block = 0;
             std::uint64_t chain = 0;
             std::vector<llvm::AllocaInst*> slots, outside_slots;
-            std::vector<bool> live;
         };
         std::unordered_map<Id, Definition> definitions;
         std::unordered_map<Id, Value> values;
@@ -316,9 +319,7 @@ class Emitter {
     void emit_edge(std::uint32_t from, Id to, llvm::Value* condition);
     bool is_cheap(std::uint32_t index) const;
     std::unordered_map<Id, Value> constants_;
-    std::unordered_map<Id, llvm::GlobalVariable*> constant_arrays_;
     std::unordered_map<std::string, llvm::Value*> shared_;
-    friend class Math;
 };
 
 }  // namespace nacre::cpu

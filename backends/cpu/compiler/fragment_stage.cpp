@@ -261,20 +261,15 @@ void FragmentEmitter::store_outputs() {
 }
 
 void FragmentEmitter::emit() {
-    auto* type = llvm::FunctionType::get(builder.getVoidTy(), {pointer_type, pointer_type, builder.getInt32Ty()}, false);
-    function_ = llvm::Function::Create(type, llvm::Function::ExternalLinkage, "kernel", target);
-    shader_context = function_->getArg(0);
-    slot_block = llvm::BasicBlock::Create(context, "slots", function_);
-    llvm::BasicBlock* start = llvm::BasicBlock::Create(context, "start", function_);
-    llvm::BasicBlock* loop = llvm::BasicBlock::Create(context, "batch", function_);
-    llvm::BasicBlock* done = llvm::BasicBlock::Create(context, "done", function_);
-    builder.SetInsertPoint(start);
-    builder.CreateCondBr(builder.CreateICmpNE(function_->getArg(2), int32(0)), loop, done);
-    builder.SetInsertPoint(loop);
-    llvm::PHINode* number = builder.CreatePHI(builder.getInt32Ty(), 2, "batch");
-    number->addIncoming(int32(0), start);
-    batch = builder.CreateGEP(builder.getInt8Ty(), function_->getArg(1),
-                              builder.CreateMul(builder.CreateZExt(number, builder.getInt64Ty()), int64(sizeof(FragmentBatch))));
+    emit_batches(2, sizeof(FragmentBatch), [&](llvm::Value* one) {
+        batch = one;
+        emit_batch();
+    });
+    program.early_tests = module.early_fragment_tests;
+    program.has_side_effects = has_side_effects;
+}
+
+void FragmentEmitter::emit_batch() {
     const std::uint32_t quads = lanes / 4;
     for (std::uint32_t q = 0; q < quads; ++q)
         primitives[q] = builder.CreateAlignedLoad(pointer_type, at_offset(batch, static_cast<std::int64_t>(offsetof(FragmentBatch, primitives) + q * 8)), llvm::Align(8));
@@ -311,15 +306,6 @@ void FragmentEmitter::emit() {
     emit_function(module.entry(), {}, all_lanes());
     mask = all_lanes();
     store_outputs();
-    llvm::Value* next = builder.CreateAdd(number, int32(1));
-    number->addIncoming(next, builder.GetInsertBlock());
-    builder.CreateCondBr(builder.CreateICmpULT(next, function_->getArg(2)), loop, done);
-    builder.SetInsertPoint(done);
-    builder.CreateRetVoid();
-    builder.SetInsertPoint(slot_block);
-    builder.CreateBr(start);
-    program.early_tests = module.early_fragment_tests;
-    program.has_side_effects = has_side_effects;
 }
 
 }  // namespace nacre::cpu

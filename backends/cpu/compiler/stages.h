@@ -41,6 +41,7 @@ class VertexEmitter final : public Emitter {
   private:
     std::vector<Component> input_components(const Variable& variable) override;
     Component fetch(const rhi::VertexAttribute& attribute, std::uint32_t component, const Type& scalar);
+    void emit_batch();
     void store_outputs();
     const VertexInput& input_;
     llvm::Value *draw = nullptr, *batch = nullptr, *indices = nullptr, *instance = nullptr;
@@ -62,21 +63,16 @@ class FragmentEmitter final : public Emitter {
     };
     Component evaluate_plane(std::size_t offset, const Place& place);  ///< Of the plane at a byte offset in PrimitiveData.
     Component evaluate_input(std::uint32_t index, const Place& place, const Type& scalar);
-    Component plane_constant(std::size_t offset);
     Component primitive_word(std::size_t offset, llvm::Type* type);
     Place place_at(llvm::Value* inside_x, llvm::Value* inside_y);
     Component difference(const Component& value, bool vertical, bool is_fine);
+    void emit_batch();
     void store_outputs();
-    struct InputLeaf {
-        std::uint32_t first = 0;  ///< Into program.inputs, of the variable's first scalar.
-    };
     void declare_inputs();
     llvm::Value* batch = nullptr;
     std::array<llvm::Value*, max_quads> primitives{};
-    llvm::Value* is_single = nullptr;  ///< i1: all quads are of one primitive.
     llvm::Value *pixel_x = nullptr, *pixel_y = nullptr;  ///< Float, left upper corner of each lane's pixel.
     Place center, centroid;
-    llvm::Value* w = nullptr;
     std::unordered_map<Id, std::vector<std::uint32_t>> input_numbers_;  ///< For each scalar of an input variable.
 };
 

@@ -48,7 +48,7 @@ Component VertexEmitter::fetch(const rhi::VertexAttribute& attribute, std::uint3
     const bool is_fixed = layout.per_instance || layout.stride == 0;
     llvm::Value* element = is_fixed ? (layout.stride == 0 ? static_cast<llvm::Value*>(int32(0)) : instance) : indices;
     const auto widened = [&](llvm::Value* value) {
-        return builder.CreateZExt(value, value->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getInt64Ty())) : builder.getInt64Ty());
+        return builder.CreateZExt(value, like(value, builder.getInt64Ty()));
     };
     llvm::Value* wide = widened(element);
     llvm::Type* wide_type = wide->getType();
@@ -68,11 +68,11 @@ Component VertexEmitter::fetch(const rhi::VertexAttribute& attribute, std::uint3
         bits = builder.CreateMaskedGather(vector_of(word), addresses_of, llvm::Align(1), fits, llvm::Constant::getNullValue(vector_of(word)));
     }
     const auto constant_word = [&](std::uint32_t value) { return llvm::ConstantInt::get(bits->getType(), value); };
-    const auto float_type = [&]() { return bits->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(builder.getFloatTy())) : builder.getFloatTy(); };
+    const auto float_type = [&]() { return like(bits, builder.getFloatTy()); };
     const auto to_result = [&](llvm::Value* value) -> Component {
         llvm::Type* kind = scalar_type(scalar);
         if (is_integer) {
-            llvm::Type* shaped = value->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(kind)) : kind;
+            llvm::Type* shaped = like(value, kind);
             return Component(builder.CreateZExtOrTrunc(value, shaped));
         }
         return Component(kind->isFloatTy() ? value : math.convert_float(value, kind));
@@ -200,21 +200,15 @@ void VertexEmitter::store_outputs() {
 }
 
 void VertexEmitter::emit() {
-    auto* type = llvm::FunctionType::get(builder.getVoidTy(), {pointer_type, pointer_type, pointer_type, builder.getInt32Ty()}, false);
-    function_ = llvm::Function::Create(type, llvm::Function::ExternalLinkage, "kernel", target);
-    shader_context = function_->getArg(0);
-    draw = function_->getArg(1);
-    slot_block = llvm::BasicBlock::Create(context, "slots", function_);
-    llvm::BasicBlock* start = llvm::BasicBlock::Create(context, "start", function_);
-    llvm::BasicBlock* loop = llvm::BasicBlock::Create(context, "batch", function_);
-    llvm::BasicBlock* done = llvm::BasicBlock::Create(context, "done", function_);
-    builder.SetInsertPoint(start);
-    builder.CreateCondBr(builder.CreateICmpNE(function_->getArg(3), int32(0)), loop, done);
-    builder.SetInsertPoint(loop);
-    llvm::PHINode* number = builder.CreatePHI(builder.getInt32Ty(), 2, "batch");
-    number->addIncoming(int32(0), start);
-    batch = builder.CreateGEP(builder.getInt8Ty(), function_->getArg(2),
-                              builder.CreateMul(builder.CreateZExt(number, builder.getInt64Ty()), int64(sizeof(VertexBatch))));
+    emit_batches(3, sizeof(VertexBatch), [&](llvm::Value* one) {
+        batch = one;
+        draw = function_->getArg(1);
+        emit_batch();
+    });
+    program.has_side_effects = has_side_effects;
+}
+
+void VertexEmitter::emit_batch() {
     indices = builder.CreateAlignedLoad(vector_of(builder.getInt32Ty()), at_offset(batch, offsetof(VertexBatch, indices)), llvm::Align(4));
     instance = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(VertexBatch, instance)), llvm::Align(4));
     llvm::Value* count = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(VertexBatch, count)), llvm::Align(4));
@@ -226,14 +220,6 @@ void VertexEmitter::emit() {
     emit_function(module.entry(), {}, all_lanes());
     mask = all_lanes();
     store_outputs();
-    llvm::Value* next = builder.CreateAdd(number, int32(1));
-    number->addIncoming(next, builder.GetInsertBlock());
-    builder.CreateCondBr(builder.CreateICmpULT(next, function_->getArg(3)), loop, done);
-    builder.SetInsertPoint(done);
-    builder.CreateRetVoid();
-    builder.SetInsertPoint(slot_block);
-    builder.CreateBr(start);
-    program.has_side_effects = has_side_effects;
 }
 
 }  // namespace nacre::cpu
