@@ -55,6 +55,18 @@ function(nacre_embed_files target)
   target_sources(${target} PRIVATE "${output}")
 endfunction()
 
+# The precompiled header of all parts that use fmt; made by the first of them.
+function(nacre_use_part_headers target)
+  if(NOT TARGET nacre_part_headers)
+    find_package(fmt REQUIRED)
+    add_library(nacre_part_headers STATIC EXCLUDE_FROM_ALL "${CMAKE_SOURCE_DIR}/cmake/part_headers.cpp")
+    target_compile_features(nacre_part_headers PRIVATE cxx_std_23)
+    target_link_libraries(nacre_part_headers PRIVATE fmt::fmt)
+    target_precompile_headers(nacre_part_headers PRIVATE "${CMAKE_SOURCE_DIR}/cmake/part_headers.h")
+  endif()
+  target_precompile_headers(${target} REUSE_FROM nacre_part_headers)
+endfunction()
+
 # nacre_add_part(<name> SOURCES ... [USES <part>...] [LIBRARIES <private library>...])
 # One static library `nacre_<name>` (alias nacre::<name>); headers are included from the source root.
 function(nacre_add_part name)
@@ -70,6 +82,9 @@ function(nacre_add_part name)
     target_link_libraries(${target} PUBLIC nacre::${part})
   endforeach()
   target_link_libraries(${target} PRIVATE ${ARG_LIBRARIES})
+  if("fmt::fmt" IN_LIST ARG_LIBRARIES)
+    nacre_use_part_headers(${target})
+  endif()
   install(TARGETS ${target} EXPORT nacre-targets)
   # For nacreConfig.cmake: who links the installed library needs the packages behind it. The package of a library is
   # the one of those found that is named like it.
