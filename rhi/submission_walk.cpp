@@ -157,10 +157,10 @@ SubmissionWalk::Step SubmissionWalk::check_group(BindGroupObject& group, const c
                                ErrorCode::validation,
                                attempted,
                                place() + ", bind group '" + group.name + "', binding " + std::to_string(use.binding),
-                               std::string("expected a live ") + kind + ", found one that was destroyed" +
-                                   (use.slot->generation == use.generation + 1 && !use.slot->last_name.empty()
-                                        ? " ('" + use.slot->last_name + "')"
-                                        : ""),
+                               fmt::format("expected a live {}, found one that was destroyed{}", kind,
+                                           use.slot->generation == use.generation + 1 && !use.slot->last_name.empty()
+                                               ? fmt::format(" ('{}')", use.slot->last_name)
+                                               : std::string()),
                                "Destroy it after the bind group's last use, or make a new bind group."};
         return {};
     };
