@@ -202,8 +202,8 @@ void fragment_function(const cpu::ShaderContext* context, cpu::FragmentBatch* ba
             } else if constexpr (shader == TestShader::position) {
                 color(x, y, plane_at(primitive.depth, primitive, x, y), plane_at(primitive.inverse_w, primitive, x, y));
             } else if constexpr (shader == TestShader::point) {
-                color((x - primitive.point_x) * primitive.inverse_point_size,
-                      (y - primitive.point_y) * primitive.inverse_point_size, 0, 1);
+                color((x - primitive.origin_x) * primitive.inverse_point_size,
+                      (y - primitive.origin_y) * primitive.inverse_point_size, 0, 1);
             } else if constexpr (shader == TestShader::coverage) {
                 colors[0][0][lane] = batch.sample_mask_in[lane];
                 colors[0][1][lane] = batch.sample_index;
