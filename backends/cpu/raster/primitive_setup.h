@@ -30,10 +30,13 @@ NACRE_LANES_INLINE void store_planes(Plane* planes, Float4 c, Float4 dx, Float4 
 struct WindowSlopes {
     float dx01, dy01, dx20, dy20;  ///< Differences of window coordinates over twice the area.
     float x0, y0;                  ///< Of vertex 0, from the center of pixel (0, 0).
+    bool precise;                  ///< False for slivers: their area has lost too many digits.
 
     WindowSlopes(const ScreenVertex& v0, const ScreenVertex& v1, const ScreenVertex& v2)
         : dx01(v0.x - v1.x), dy01(v0.y - v1.y), dx20(v2.x - v0.x), dy20(v2.y - v0.y), x0(v0.x - 0.5f), y0(v0.y - 0.5f) {
-        const float scale = 1.0f / (dx01 * dy20 - dx20 * dy01);
+        const float area = dx01 * dy20 - dx20 * dy01;
+        precise = std::abs(area) > 0.03125f * (std::abs(dx01 * dy20) + std::abs(dx20 * dy01));
+        const float scale = 1.0f / area;
         dx01 *= scale, dy01 *= scale, dx20 *= scale, dy20 *= scale;
     }
     /// T is float or Float4.
@@ -46,8 +49,8 @@ struct WindowSlopes {
     }
 };
 
-inline void window_planes(const DrawPlan& draw, const ScreenVertex* const (&vertices)[3], PrimitiveData& primitive) {
-    const WindowSlopes slopes(*vertices[0], *vertices[1], *vertices[2]);
+inline void window_planes(const DrawPlan& draw, const WindowSlopes& slopes, const ScreenVertex* const (&vertices)[3],
+                          PrimitiveData& primitive) {
     primitive.origin_x = primitive.origin_y = 0.5f;
     primitive.inverse_w.reserved = 0.0f;
     slopes.plane(vertices[0]->inverse_w, vertices[1]->inverse_w, vertices[2]->inverse_w, primitive.inverse_w.c,
@@ -135,8 +138,13 @@ inline void set_up_primitive(const DrawPlan& draw, const Record& record, const s
             return;
         case PlaneSource::window:
             vertices[1] = vertex(1), vertices[2] = vertex(2);
-            window_planes(draw, vertices, primitive);
-            return;
+            if (const WindowSlopes slopes(*vertices[0], *vertices[1], *vertices[2]); slopes.precise)
+                return window_planes(draw, slopes, vertices, primitive);
+            weights = triangle_weights(static_cast<double>(vertices[1]->x) - vertices[0]->x,
+                                       static_cast<double>(vertices[1]->y) - vertices[0]->y,
+                                       static_cast<double>(vertices[2]->x) - vertices[0]->x,
+                                       static_cast<double>(vertices[2]->y) - vertices[0]->y);
+            break;
         case PlaneSource::snapped: {
             vertices[1] = vertex(1), vertices[2] = vertex(2);
             const int second = record.bits & Record::swapped ? 2 : 1, third = 3 - second;

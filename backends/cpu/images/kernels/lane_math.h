@@ -111,26 +111,12 @@ NACRE_INLINE Floats<W> fraction(Floats<W> x) {
     return small - floor_small<W>(small);
 }
 
-/// Logarithm to base 2 within 2e-7 + 1 ulp; 0 and NaN (whose bits differ between machines) give -infinity, infinity
-/// gives 128. x >= 0.
-template <int W>
-NACRE_INLINE Floats<W> log2_lanes(Floats<W> x) {
-    const Ints<W> bits = (Ints<W>)x;
-    // Mantissa in [sqrt(1/2), sqrt(2)), so that the series converges quickly: |t| < 0.172.
-    const Ints<W> exponent = (Ints<W>)((Uints<W>)bits - 0x3f3504f3u) >> 23;
-    const Floats<W> mantissa = (Floats<W>)((Uints<W>)bits - ((Uints<W>)exponent << 23));
-    const Floats<W> t = (mantissa - 1.0f) / (mantissa + 1.0f), t2 = t * t;
-    // 2 / ln 2 * artanh(t)
-    const Floats<W> series =
-        t * (((((t2 * 0.32059889f) + 0.41219858f) * t2 + 0.57707802f) * t2 + 0.96179669f) * t2 + 2.8853901f);
-    const Floats<W> result = to_floats<W>(exponent) + series;
-    return x >= 1.17549435e-38f ? result : splat<W>(-__builtin_inff());
-}
-
-/// Logarithm to base 2, linear between the powers of two: too small by up to 0.0861. x >= 0; 0 gives -127.
+/// Logarithm to base 2, linear between the powers of two: too small by up to 0.0861. x >= 0; 0 and NaN (whose bits differ
+/// between machines) give -127, infinity gives 128.
 template <int W>
 NACRE_INLINE Floats<W> linear_log2(Floats<W> x) {
-    return to_floats<W>((Ints<W>)x - 0x3f800000) * 0x1p-23f;
+    const Floats<W> result = to_floats<W>((Ints<W>)x - 0x3f800000) * 0x1p-23f;
+    return x >= 1.17549435e-38f ? result : splat<W>(-127.0f);
 }
 
 /// Lane `which` of each quad in all four lanes of it.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Interpolated values against the Vulkan device of this machine.
+// Interpolated values and mips against the Vulkan device of this machine.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -125,7 +125,7 @@ Expected<std::vector<float>> draw(const std::string& backend, const std::vector<
 }
 
 // The same bits: planes and their evaluation are made of the same operations on both.
-TEST(RasterDevice, InterpolatesToTheBit) {
+TEST(VulkanParity, InterpolatesToTheBit) {
     const std::vector<Vertex> vertices = random_triangles();
     const auto theirs = draw("vulkan", vertices);
     if (!theirs && theirs.error().code == ErrorCode::not_found) GTEST_SKIP() << theirs.error().message();
@@ -145,6 +145,45 @@ TEST(RasterDevice, InterpolatesToTheBit) {
         EXPECT_GT(covered, 100'000u);
         EXPECT_EQ(different, 0u) << "first at word " << first << ": " << (*ours)[first] << " and " << (*theirs)[first];
     }
+}
+
+constexpr std::uint32_t mip_count = 9;
+
+// All mips, one after the other.
+Expected<std::vector<std::byte>> make_mips(const std::string& backend) {
+    using namespace rhi;
+    const Instance instance(all_backends());
+    NACRE_TRY(const std::unique_ptr<Device> device, instance.create_device({.backend = backend}));
+    NACRE_TRY(const Texture texture,
+              device->create_texture({.format = Format::rgba8_unorm,
+                                      .width = 256,
+                                      .height = 256,
+                                      .mips = mip_count,
+                                      .usage = TextureUsage::sampled | TextureUsage::copy_destination |
+                                               TextureUsage::copy_source | TextureUsage::color_target,
+                                      .name = "mips"}));
+    std::mt19937 random(5);
+    std::vector<std::uint8_t> texels(std::size_t{256} * 256 * 4);
+    for (std::uint8_t& texel : texels) texel = static_cast<std::uint8_t>(random());
+    NACRE_CHECK(device->write_texture(texture, std::as_bytes(std::span(texels)), 0, 0));
+    CommandList list = device->create_command_list("mips");
+    list.generate_mips(texture);
+    NACRE_CHECK(device->submit(std::move(list)));
+    std::vector<std::byte> result;
+    for (std::uint32_t mip = 0; mip < mip_count; ++mip) {
+        NACRE_TRY(const std::vector<std::byte> bytes, device->read_texture(texture, mip, 0));
+        result.insert(result.end(), bytes.begin(), bytes.end());
+    }
+    return result;
+}
+
+TEST(VulkanParity, AveragesToTheBit) {
+    const auto theirs = make_mips("vulkan");
+    if (!theirs && theirs.error().code == ErrorCode::not_found) GTEST_SKIP() << theirs.error().message();
+    ASSERT_TRUE(theirs) << theirs.error().message();
+    const auto ours = make_mips("cpu");
+    ASSERT_TRUE(ours) << ours.error().message();
+    EXPECT_EQ(*ours, *theirs);
 }
 
 }  // namespace
