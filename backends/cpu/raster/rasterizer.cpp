@@ -51,11 +51,12 @@ struct Rasterizer::State {
 
     std::vector<ChunkScratch> scratch;
     std::vector<AlignedMemory> workspaces;
-    std::vector<AlignedMemory> primitive_memory;
+    std::vector<AlignedMemory> primitive_memory, color_memory;
     std::vector<ChunkView> views;
     std::vector<const DrawPlan*> plans;
     std::vector<std::uint32_t> busy_tiles;
     std::vector<std::uint8_t> tile_marks;
+    std::vector<std::uint8_t> uncleared;  ///< For each tile: whether what is to be cleared there still is to be.
 
     State(Scheduler& of_scheduler, std::uint32_t lane_count, const RasterizerOptions& of_options)
         : scheduler(of_scheduler),
@@ -64,7 +65,8 @@ struct Rasterizer::State {
           kernels(choose_kernels(of_options.instruction_set)),
           scratch(of_scheduler.thread_count()),
           workspaces(of_scheduler.thread_count()),
-          primitive_memory(of_scheduler.thread_count()) {
+          primitive_memory(of_scheduler.thread_count()),
+          color_memory(of_scheduler.thread_count()) {
         for (AlignedMemory& memory : workspaces) {
             memory.reserve(sizeof(Workspace), 0);
             std::memset(memory.data(), 0, sizeof(Workspace));
@@ -96,7 +98,7 @@ struct Rasterizer::State {
         if (count == 0 || call.instance_count == 0 || !pipeline.vertex.run || targets.tiles_x == 0 ||
             targets.tiles_y == 0)
             return;
-        if (draw_count == slab_draws) flush();
+        if (draw_count == slab_draws) flush(false);
         std::uint32_t index = enqueue(state, call);
         const bool whole = pipeline.vertex.has_side_effects && count <= largest_whole_instance;
         for (std::uint32_t instance = 0; instance < call.instance_count; ++instance) {
@@ -106,7 +108,7 @@ struct Rasterizer::State {
                         discard_queue();
                         return;
                     }
-                    flush();
+                    flush(false);
                     index = enqueue(state, call);
                 }
                 Chunk& chunk = open_chunk();
@@ -130,8 +132,10 @@ struct Rasterizer::State {
             scheduler.run(count, task);
     }
 
-    void flush() {
-        if (chunk_count == 0) {
+    /// Carries out what is queued; at the end of the pass also the clears of tiles that nothing was drawn to.
+    void flush(bool ends_pass) {
+        const bool clears = ends_pass && std::ranges::find(uncleared, 1) != uncleared.end();
+        if (chunk_count == 0 && !clears) {
             draw_count = 0;
             return;
         }
@@ -155,7 +159,7 @@ struct Rasterizer::State {
         }
         busy_tiles.clear();
         for (std::uint32_t tile = 0; tile < tile_count; ++tile)
-            if (all_tiles || tile_marks[tile]) busy_tiles.push_back(tile);
+            if (all_tiles || tile_marks[tile] || (clears && uncleared[tile])) busy_tiles.push_back(tile);
 
         std::size_t primitive_bytes = sizeof(PrimitiveData);
         plans.clear();
@@ -166,12 +170,16 @@ struct Rasterizer::State {
         for (std::uint32_t thread = 0; thread < primitive_memory.size(); ++thread) {
             primitive_memory[thread].reserve(primitive_bytes * primitive_slots, 0);
             workspace(thread).primitives = primitive_memory[thread].data();
+            color_memory[thread].reserve(std::size_t{targets.color_planes} * tile_pixels * sizeof(std::uint32_t), 0);
+            workspace(thread).colors = reinterpret_cast<std::uint32_t*>(color_memory[thread].data());
         }
         const TileJob job{&targets,     views.data(), static_cast<std::uint32_t>(views.size()),
-                          plans.data(), lanes,        &srgb_tables()};
+                          plans.data(), lanes,        &srgb_tables(),
+                          uncleared.data()};
         run(static_cast<std::uint32_t>(busy_tiles.size()), [&](std::uint32_t index, std::uint32_t thread) {
             kernels.draw_tile(job, busy_tiles[index], workspace(thread));
         });
+        for (const std::uint32_t tile : busy_tiles) uncleared[tile] = 0;
         discard_queue();
     }
 };
@@ -182,17 +190,20 @@ Rasterizer::~Rasterizer() = default;
 
 void Rasterizer::begin_pass(const RenderTargets& targets) {
     state_->discard_queue();
-    state_->targets = target_set(targets);
+    const TargetSet& set = state_->targets = target_set(targets);
+    const bool clears = set.depth_clears || set.stencil_clears ||
+                        std::any_of(set.colors, set.colors + set.color_count, [](const auto& at) { return at.clears; });
+    state_->uncleared.assign(std::size_t{set.tiles_x} * set.tiles_y, clears ? 1 : 0);
     for (std::uint32_t thread = 0; thread < state_->workspaces.size(); ++thread)
         state_->workspace(thread).passed_samples = 0;
 }
 
 void Rasterizer::draw(const DrawState& state, const DrawCall& call) { state_->draw(state, call); }
 
-void Rasterizer::end_pass() { state_->flush(); }
+void Rasterizer::end_pass() { state_->flush(true); }
 
 std::uint64_t Rasterizer::passed_samples() {
-    state_->flush();
+    state_->flush(false);
     std::uint64_t sum = 0;
     for (std::uint32_t thread = 0; thread < state_->workspaces.size(); ++thread)
         sum += state_->workspace(thread).passed_samples;

@@ -39,11 +39,12 @@ struct Coverage {
 
     TileRun& run;
     // Edges that cross the tile inside of the triangle's bounds; the others are inside everywhere there.
-    std::int32_t a[3] = {}, b[3] = {}, e[3][samples] = {};
+    std::int32_t a[4], b[4], e[samples][4];
     std::uint32_t edges = 0;
     std::int32_t x0, x1, y0, y1;  ///< Pixels of the tile, inclusive.
     bool bounded = false;         ///< Blocks may stick out of these without an edge that says so.
-    Ints steps[3];                ///< Edge function of each lane less that of the block's first.
+
+    explicit Coverage(TileRun& of_run) : run(of_run) {}
 
     /// @return whether anything may be covered
     bool set_up() {
@@ -94,22 +95,35 @@ struct Coverage {
                 continue;
             }
             a[edges] = edge_a, b[edges] = edge_b;
-            for (std::uint32_t s = 0; s < samples; ++s) e[edges][s] = static_cast<std::int32_t>(values[s]);
+            for (std::uint32_t s = 0; s < samples; ++s) e[s][edges] = static_cast<std::int32_t>(values[s]);
             ++edges;
         }
-        for (std::uint32_t i = 0; i < 3; ++i) steps[i] = ints(a[i]) * load(lane_x) + ints(b[i]) * load(lane_y);
         return true;
     }
 
-    /// Lanes of the block that sample `s` covers, by the edges alone.
+    /// Edge functions of a row of blocks, block by block.
     template <int edge_count>
-    [[gnu::always_inline]] std::uint32_t covered(std::int32_t block_x, std::int32_t block_y, std::uint32_t s) const {
-        Ints inside = steps[0] + ints(e[0][s] + a[0] * (4 * block_x) + b[0] * (4 * block_y));
-        if constexpr (edge_count > 1)
-            inside = inside | (steps[1] + ints(e[1][s] + a[1] * (4 * block_x) + b[1] * (4 * block_y)));
-        if constexpr (edge_count > 2)
-            inside = inside | (steps[2] + ints(e[2][s] + a[2] * (4 * block_x) + b[2] * (4 * block_y)));
-        return mask_of(not_negative(inside));
+    struct Walk {
+        Ints values[edge_count > 0 ? edge_count : 1];
+        NACRE_LANES_INLINE void next(const Ints* steps) {
+            for (int i = 0; i < edge_count; ++i) values[i] = values[i] + steps[i];
+        }
+        /// Lanes inside of all edges.
+        [[nodiscard]] NACRE_LANES_INLINE std::uint32_t covered() const {
+            if constexpr (edge_count == 0) return 0xffff;
+            Ints inside = values[0];
+            for (int i = 1; i < edge_count; ++i) inside = inside | values[i];
+            return mask_of(not_negative(inside));
+        }
+    };
+    template <int edge_count>
+    [[gnu::always_inline]] Walk<edge_count> walk_from(std::int32_t block_x, std::int32_t block_y,
+                                                      std::uint32_t s) const {
+        Walk<edge_count> walk;
+        for (int i = 0; i < edge_count; ++i)
+            walk.values[i] = ints(a[i]) * load(lane_x) + ints(b[i]) * load(lane_y) +
+                             ints(e[s][i] + a[i] * (4 * block_x) + b[i] * (4 * block_y));
+        return walk;
     }
 
     /// The frequent case: one sample, depth tested before the fragment function or not at all, no stencil.
@@ -117,43 +131,47 @@ struct Coverage {
     void run_simple_blocks(std::int32_t first_x, std::int32_t last_x, std::int32_t first_y, std::int32_t last_y) {
         const Record& record = *run.record;
         const DrawPlan& draw = *run.draw;
-        const rhi::CompareOperation operation = draw.depth_stencil.compare;
         const bool shades = draw.shades, tests = run.depth != nullptr, writes = draw.depth_stencil.depth_write;
+        const DepthLayout layout = run.targets.depth_layout;
         const Floats plane_c = floats(record.depth_c), plane_dx = floats(record.depth_dx), from_x = floats(record.x0);
-        const Floats center_x = to_floats(load(lane_x)) + floats(static_cast<float>(run.tile_x) + 0.5f);
+        const Floats center_x = to_floats(load(lane_x)) + floats(static_cast<float>(run.tile_x + 4 * first_x) + 0.5f);
         const Floats center_y = to_floats(load(lane_y)) + floats(static_cast<float>(run.tile_y) + 0.5f);
-        std::uint32_t passed = 0;
-        for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y) {
+        Walk<edge_count> row = walk_from<edge_count>(first_x, first_y, 0);
+        Ints across[edge_count > 0 ? edge_count : 1], down[edge_count > 0 ? edge_count : 1];
+        for (int i = 0; i < edge_count; ++i) across[i] = ints(4 * a[i]), down[i] = ints(4 * b[i]);
+        std::uint32_t passed = 0, written = 0;
+        for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y, row.next(down)) {
             // As in TileRun::depth_at; what is the same in a row of blocks is computed once.
             const Floats along_y =
                 floats(record.depth_dy) * (center_y + floats(static_cast<float>(4 * block_y)) - floats(record.y0));
-            for (std::int32_t block_x = first_x; block_x <= last_x; ++block_x) {
-                std::uint32_t mask = bounded ? lanes_inside(block_x, block_y, x0, x1, y0, y1) : 0xffff;
-                if constexpr (edge_count > 0) mask &= covered<edge_count>(block_x, block_y, 0);
+            Walk<edge_count> walk = row;
+            Floats x = center_x;
+            for (std::int32_t block_x = first_x; block_x <= last_x;
+                 ++block_x, walk.next(across), x = x + floats(4.0f)) {
+                std::uint32_t mask = walk.covered();
+                if (bounded) mask &= lanes_inside(block_x, block_y, x0, x1, y0, y1);
                 if (mask == 0) continue;
                 const std::uint32_t place = block_place(block_x, block_y);
                 if (tests) {
-                    const Floats x = center_x + floats(static_cast<float>(4 * block_x));
-                    const Ints key = depth_key(run.targets.depth_layout, plane_c + plane_dx * (x - from_x) + along_y,
-                                               run.depth_low, run.depth_high);
+                    const Ints key = depth_key(layout, plane_c + plane_dx * (x - from_x) + along_y, run.depth_low,
+                                               run.depth_high);
                     std::int32_t* const depth = run.memory.depth[0] + place;
                     const Ints old = load(depth);
-                    mask &= mask_of(operation == rhi::CompareOperation::less            ? less(key, old)
-                                    : operation == rhi::CompareOperation::less_or_equal ? ~less(old, key)
-                                                                                        : compare(operation, key, old));
+                    const std::uint32_t below = mask_of(less(key, old)), same = mask_of(equal(key, old));
+                    mask &= (below & run.on_less) | (same & run.on_equal) | (~(below | same) & run.on_greater);
+                    if (writes) store(depth, select(lanes_of(mask), key, old)), written |= mask;
                     if (mask == 0) continue;
-                    if (writes) {
-                        store(depth, select(lanes_of(mask), key, old));
-                        run.depth_written(place);
-                    }
                 }
                 passed += static_cast<std::uint32_t>(__builtin_popcount(mask));
-                if (shades)
-                    run.append_block(0, run.tile_x + 4 * block_x, run.tile_y + 4 * block_y, place, mask, nullptr,
-                                     nullptr);
+                if (shades) run.append_block(0, place, mask, nullptr, nullptr);
             }
         }
         run.memory.passed_samples += passed;
+        if (written == 0) return;
+        for (std::int32_t y = first_y / region_blocks; y <= last_y / region_blocks; ++y)
+            for (std::int32_t x = first_x / region_blocks; x <= last_x / region_blocks; ++x)
+                run.region_written(static_cast<std::uint32_t>(y * regions_across + x),
+                                   static_cast<std::uint32_t>((last_x - first_x + 1) * (last_y - first_y + 1)));
     }
 
     template <int edge_count>
@@ -164,18 +182,23 @@ struct Coverage {
                 return;
             }
         }
-        for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y)
+        Ints across[edge_count > 0 ? edge_count : 1];
+        for (int i = 0; i < edge_count; ++i) across[i] = ints(4 * a[i]);
+        for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y) {
+            Walk<edge_count> walks[samples];
+            for (std::uint32_t s = 0; s < samples; ++s) walks[s] = walk_from<edge_count>(first_x, block_y, s);
             for (std::int32_t block_x = first_x; block_x <= last_x; ++block_x) {
                 const std::uint32_t limit = bounded ? lanes_inside(block_x, block_y, x0, x1, y0, y1) : 0xffff;
                 std::uint32_t masks[samples];
                 std::uint32_t any = 0;
                 for (std::uint32_t s = 0; s < samples; ++s) {
-                    masks[s] = limit;
-                    if constexpr (edge_count > 0) masks[s] &= covered<edge_count>(block_x, block_y, s);
+                    masks[s] = limit & walks[s].covered();
+                    walks[s].next(across);
                     any |= masks[s];
                 }
                 if (any) shade_block(block_x, block_y, masks);
             }
+        }
     }
     void run_blocks(std::uint32_t edge_count, std::int32_t first_x, std::int32_t last_x, std::int32_t first_y,
                     std::int32_t last_y) {
@@ -225,10 +248,7 @@ struct Coverage {
         const Int4 edge_a = y - next_y, edge_b = next_x - x;
         const Int4 owns_border = (edge_a > 0) | ((edge_a == 0) & (edge_b > 0));
         const Int4 value = (-1 - owns_border - edge_a * x - edge_b * y) >> subpixel_bits;
-        for (int i = 0; i < 3; ++i) {
-            a[i] = edge_a[i], b[i] = edge_b[i], e[i][0] = value[i];
-            steps[i] = ints(a[i]) * load(lane_x) + ints(b[i]) * load(lane_y);
-        }
+        store4(a, edge_a), store4(b, edge_b), store4(e[0], value);
         run_blocks<3>(x0 / 4, x1 / 4, y0 / 4, y1 / 4);
         return true;
     }
@@ -249,23 +269,26 @@ struct Coverage {
             for (std::int32_t x = region_x; x <= x1 / 16; ++x) {
                 const std::int32_t left = x * 16 > x0 ? x * 16 : x0, right = x * 16 + 15 < x1 ? x * 16 + 15 : x1;
                 const std::int32_t top = y * 16 > y0 ? y * 16 : y0, bottom = y * 16 + 15 < y1 ? y * 16 + 15 : y1;
-                std::uint32_t crossing = 0;
+                // The edges that cross this region, in front of all others.
+                Coverage part = *this;
+                part.edges = 0;
                 bool outside = false;
                 for (std::uint32_t i = 0; i < edges; ++i) {
-                    std::int32_t low = e[i][0], high = e[i][0];
+                    std::int32_t low = e[0][i], high = e[0][i];
                     for (std::uint32_t s = 1; s < samples; ++s) {
-                        low = e[i][s] < low ? e[i][s] : low, high = e[i][s] > high ? e[i][s] : high;
+                        low = e[s][i] < low ? e[s][i] : low, high = e[s][i] > high ? e[s][i] : high;
                     }
                     low += a[i] * (a[i] < 0 ? right : left) + b[i] * (b[i] < 0 ? bottom : top);
                     high += a[i] * (a[i] < 0 ? left : right) + b[i] * (b[i] < 0 ? top : bottom);
                     outside |= high < 0;
-                    crossing += low < 0;
+                    if (low >= 0) continue;
+                    part.a[part.edges] = a[i], part.b[part.edges] = b[i];
+                    for (std::uint32_t s = 0; s < samples; ++s) part.e[s][part.edges] = e[s][i];
+                    ++part.edges;
                 }
                 if (outside || (rejects && run.hidden(x, y, left, right, top, bottom))) continue;
-                const bool was_bounded = bounded;
-                bounded = bounded || crossing == 0;
-                run_blocks(crossing == 0 ? 0 : edges, left / 4, right / 4, top / 4, bottom / 4);
-                bounded = was_bounded;
+                part.bounded = bounded || part.edges < edges;
+                part.run_blocks(part.edges, left / 4, right / 4, top / 4, bottom / 4);
             }
     }
 
@@ -301,7 +324,7 @@ struct Coverage {
         }
         if (any == 0 || !draw.shades) return;
         if constexpr (!multisampled) {
-            run.append_block(0, x, y, place, any, nullptr, nullptr);
+            run.append_block(0, place, any, nullptr, nullptr);
         } else {
             std::uint8_t covered_samples[16] = {}, alive_samples[16] = {};
             for (std::uint32_t s = 0; s < samples; ++s)
@@ -311,10 +334,10 @@ struct Coverage {
                     alive_samples[lane] = static_cast<std::uint8_t>(alive_samples[lane] | (alive[s] >> lane & 1) << s);
                 }
             if (!draw.runs_per_sample) {
-                run.append_block(0, x, y, place, any, covered_samples, alive_samples);
+                run.append_block(0, place, any, covered_samples, alive_samples);
             } else {
                 for (std::uint32_t s = 0; s < samples; ++s)
-                    if (alive[s]) run.append_block(s, x, y, place, alive[s], nullptr, nullptr);
+                    if (alive[s]) run.append_block(s, place, alive[s], nullptr, nullptr);
             }
         }
     }

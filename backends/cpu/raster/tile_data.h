@@ -106,10 +106,15 @@ struct ColorTarget {
     std::uint64_t sample_stride;
     std::uint32_t row_stride, texel_bytes;
     rhi::Format format;
+    std::uint32_t words;        ///< Of a texel in Workspace::colors: one for each 32 bits, one for less.
+    std::uint32_t first_plane;  ///< There: of the first sample; the others follow.
+    bool clears;                ///< Filled with `clear` before the first draw.
+    std::uint32_t clear[4];
 };
 struct TargetSet {
     ColorTarget colors[8];
     std::uint32_t color_count;
+    std::uint32_t color_planes;  ///< Words of all targets and samples.
     DepthLayout depth_layout;
     std::byte* depth;
     std::uint64_t depth_sample_stride;
@@ -117,6 +122,8 @@ struct TargetSet {
     std::byte* stencil;  ///< Null where there is none.
     std::uint64_t stencil_sample_stride;
     std::uint32_t stencil_row_stride;
+    bool depth_clears, stencil_clears;  ///< As ColorTarget::clears.
+    std::uint32_t clear_depth, clear_stencil;
     std::uint32_t width, height, samples, tiles_x, tiles_y;
 };
 
@@ -163,7 +170,7 @@ struct DrawPlan {
     double scale[3], translation[3];
 };
 
-inline constexpr std::uint32_t stream_quads = 16;
+inline constexpr std::uint32_t stream_quads = 32;
 inline constexpr std::uint32_t stream_batches = stream_quads;  ///< Of one quad each, with four lanes.
 /// One slot for each quad that waits, the primitive that is drawn, and some so that none is used again too early.
 inline constexpr std::uint32_t primitive_slots = 2 * stream_quads;
@@ -171,22 +178,24 @@ inline constexpr std::uint32_t primitive_slots = 2 * stream_quads;
 /// Quads that wait for the fragment function. A block is appended without branches, hence the four more.
 struct Stream {
     const PrimitiveData* primitives[stream_quads + 4];
-    std::int32_t x[stream_quads + 4], y[stream_quads + 4];
-    std::uint32_t live[stream_quads + 4];    ///< Pixels, 4 bits.
-    std::uint32_t places[stream_quads + 4];  ///< In the tile's depth: first lane.
+    /// First lane of the quad in the tile, and above its pixels.
+    std::uint32_t places[stream_quads + 4];
+    static constexpr std::uint32_t place_mask = 0xffff, live_shift = 16;
     /// With several samples, for each pixel one bit for each: samples that the primitive covers, and those of them that
     /// passed the tests so far.
     std::uint8_t covered[stream_quads + 4][4], alive[stream_quads + 4][4];
     std::uint32_t quads;
 };
 
-/// Memory of one thread. Depth and stencil of a tile lie here as 32-bit integers that compare like the depths, in
-/// blocks of 4x4 pixels that consist of four quads: pixel (x, y) of quad (i, j) is lane 4 * (2 * j + i) + 2 * y + x.
+/// Memory of one thread. The pixels of a tile lie here in blocks of 4x4 that consist of four quads: pixel (x, y) of quad
+/// (i, j) is lane 4 * (2 * j + i) + 2 * y + x. Depth and stencil are 32-bit integers that compare like the depths. Colors
+/// are the words of the texels: those of a block together, TargetSet::color_planes times 16 lanes.
 struct alignas(64) Workspace {
     std::int32_t depth[most_samples][tile_pixels];
     std::int32_t stencil[most_samples][tile_pixels];
     Stream streams[most_samples];
     FragmentBatch batches[stream_batches];
+    std::uint32_t* colors;         ///< For the whole tile; aligned to 64 bytes.
     std::byte* primitives;         ///< `primitive_slots` of the largest DrawPlan::primitive_bytes.
     std::uint64_t passed_samples;  ///< Counts up.
 };
@@ -198,6 +207,7 @@ struct TileJob {
     const DrawPlan* const* draws;
     std::uint32_t lanes;
     const SrgbTables* srgb;
+    const std::uint8_t* uncleared;  ///< For each tile: whether targets that are to be cleared still are to be.
 };
 
 /// Vertices of a segment that come from one call of the vertex function.

@@ -10,11 +10,11 @@ namespace {
 void draw_record(TileRun& run, const Record& record, const std::byte* vertices) {
     run.begin_record(record, vertices);
     if (record.bits & Record::thin_line) {
-        ThinLine{{run, {}, {}, {}, 0, 0, 0, 0, 0, false, {}}}.draw();
+        ThinLine{Coverage<false>(run)}.draw();
     } else if (run.targets.samples > 1) {
-        Coverage<true>{run, {}, {}, {}, 0, 0, 0, 0, 0, false, {}}.draw_triangle();
+        Coverage<true>(run).draw_triangle();
     } else {
-        Coverage<false>{run, {}, {}, {}, 0, 0, 0, 0, 0, false, {}}.draw_triangle();
+        Coverage<false>(run).draw_triangle();
     }
 }
 
