@@ -283,6 +283,7 @@ NACRE_LANES_INLINE Floats absolute(const Floats& a) { return floats_of_bits(bits
 /// Four floats or integers, as the rows of a vertex or plane, or the pixels of a quad.
 using Float4 [[gnu::vector_size(16)]] = float;
 using Int4 [[gnu::vector_size(16)]] = std::int32_t;
+using Long2 [[gnu::vector_size(16)]] = std::int64_t;
 
 NACRE_LANES_INLINE Float4 load4(const float* from) {
     Float4 result;

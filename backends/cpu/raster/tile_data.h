@@ -170,20 +170,25 @@ struct DrawPlan {
     double scale[3], translation[3];
 };
 
+/// As many quads go to the fragment function at once.
 inline constexpr std::uint32_t stream_quads = 32;
 inline constexpr std::uint32_t stream_batches = stream_quads;  ///< Of one quad each, with four lanes.
+/// A stream is emptied when it holds `stream_quads`, which four blocks that are appended together may pass by; they are
+/// appended without branches, which takes another block.
+inline constexpr std::uint32_t stream_capacity = stream_quads + 16 + 4;
 /// One slot for each quad that waits, the primitive that is drawn, and some so that none is used again too early.
 inline constexpr std::uint32_t primitive_slots = 2 * stream_quads;
+static_assert(primitive_slots > stream_capacity);
 
-/// Quads that wait for the fragment function. A block is appended without branches, hence the four more.
+/// Quads that wait for the fragment function.
 struct Stream {
-    const PrimitiveData* primitives[stream_quads + 4];
+    const PrimitiveData* primitives[stream_capacity];
     /// First lane of the quad in the tile, and above its pixels.
-    std::uint32_t places[stream_quads + 4];
+    std::uint32_t places[stream_capacity];
     static constexpr std::uint32_t place_mask = 0xffff, live_shift = 16;
     /// With several samples, for each pixel one bit for each: samples that the primitive covers, and those of them that
     /// passed the tests so far.
-    std::uint8_t covered[stream_quads + 4][4], alive[stream_quads + 4][4];
+    std::uint8_t covered[stream_capacity][4], alive[stream_capacity][4];
     std::uint32_t quads;
 };
 

@@ -185,13 +185,13 @@ inline void store_pixels(std::uint32_t bytes, std::byte* to, std::uint32_t row_s
 }
 
 /// Depth as the integer that the target holds; integers compare like the depths. Floats that are not negative compare
-/// like their bits. `low` and `high` are the range of depth clamp, or 0 and 1.
+/// like their bits. `low` and `high` are the range of depth clamp, or 0 and 1; `low` is not negative, nor negative zero.
 NACRE_LANES_INLINE Ints depth_key(DepthLayout layout, const Floats& depth, float low, float high) {
     const Floats bounded = clamp(depth, low, high);
     switch (layout) {
         case DepthLayout::unorm16: return round_to_ints(bounded * floats(65535.0f));
         case DepthLayout::unorm24: return round_to_ints(bounded * floats(16777215.0f));
-        default: return bits_of(bounded) & ints(0x7fffffff);
+        default: return bits_of(bounded);
     }
 }
 /// The same for one number, in the same arithmetic.
@@ -201,7 +201,7 @@ NACRE_LANES_INLINE std::int32_t depth_key(DepthLayout layout, float depth, float
     switch (layout) {
         case DepthLayout::unorm16: return static_cast<std::int32_t>(__builtin_rintf(bounded * 65535.0f));
         case DepthLayout::unorm24: return static_cast<std::int32_t>(__builtin_rintf(bounded * 16777215.0f));
-        default: return __builtin_bit_cast(std::int32_t, bounded) & 0x7fffffff;
+        default: return __builtin_bit_cast(std::int32_t, bounded);
     }
 }
 

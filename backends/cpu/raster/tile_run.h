@@ -20,20 +20,6 @@ inline bool keeps_farther(rhi::CompareOperation operation) {
     return operation == rhi::CompareOperation::greater || operation == rhi::CompareOperation::greater_or_equal;
 }
 
-/// When a depth comparison is true, in bits: less, equal, greater.
-inline std::uint32_t compare_outcomes(rhi::CompareOperation operation) {
-    switch (operation) {
-        case rhi::CompareOperation::never: return 0;
-        case rhi::CompareOperation::less: return 1;
-        case rhi::CompareOperation::equal: return 2;
-        case rhi::CompareOperation::less_or_equal: return 3;
-        case rhi::CompareOperation::greater: return 4;
-        case rhi::CompareOperation::not_equal: return 5;
-        case rhi::CompareOperation::greater_or_equal: return 6;
-        default: return 7;
-    }
-}
-
 inline constexpr std::int32_t region_blocks = 4;  ///< A region of hierarchical depth has 4x4 blocks.
 inline constexpr std::int32_t region_size = 4 * region_blocks;
 inline constexpr std::int32_t regions_across = tile_blocks / region_blocks;
@@ -43,6 +29,9 @@ inline constexpr std::int32_t key_lowest = -0x7fffffff - 1, key_highest = 0x7fff
 alignas(16) constexpr std::int32_t quad_order[16][4] = {
     {0, 0, 0, 0}, {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {2, 0, 0, 0}, {0, 2, 0, 0}, {1, 2, 0, 0}, {0, 1, 2, 0},
     {3, 0, 0, 0}, {0, 3, 0, 0}, {1, 3, 0, 0}, {0, 1, 3, 0}, {2, 3, 0, 0}, {0, 2, 3, 0}, {1, 2, 3, 0}, {0, 1, 2, 3}};
+
+/// Where the blocks right of, below, and right below of another lie.
+constexpr std::uint32_t four_blocks[4] = {0, 16, 16 * tile_blocks, 16 * tile_blocks + 16};
 
 struct TileRun {
     const TileJob& job;
@@ -57,9 +46,8 @@ struct TileRun {
     std::int32_t* depth = nullptr;  ///< Where the draw tests depth.
     std::int32_t* stencil = nullptr;
     float depth_low = 0.0f, depth_high = 1.0f;
-    std::uint32_t on_less = 0, on_equal = 0, on_greater = 0;  ///< All lanes where the depth test passes then.
     bool simple_depth = false;                        ///< See Coverage::run_simple_blocks.
-    bool lowers_depth = false, raises_depth = false;  ///< What the draw writes may leave the bounds of a region there.
+    alignas(16) std::int32_t limits[4] = {};  ///< Pixels that may be drawn: first x and y, last x and y with all bits turned.
 
     // The record that is drawn.
     const Record* record = nullptr;
@@ -70,9 +58,15 @@ struct TileRun {
     std::uint32_t entered_regions = 0, loaded_regions[8] = {};
     bool front = true;
 
-    // Hierarchical depth: bounds of the depths of each region, and how many blocks were written since they were exact.
-    std::int32_t region_low[regions_across * regions_across], region_high[regions_across * regions_across];
-    std::uint32_t region_writes[regions_across * regions_across];
+    // Hierarchical depth: for each region a depth that no other is above, or below. Draws that keep the nearer (farther)
+    // depth can leave it as it is; it becomes exact again when the region is measured.
+    enum class Bound { none, above, below };
+    Bound bound = Bound::none;
+    bool depth_is_clear = false;  ///< All depths are TargetSet::clear_depth.
+    std::int32_t region_bounds[regions_across * regions_across];
+    std::uint8_t region_doubts[regions_across * regions_across];  ///< Questions since a region was measured.
+    /// Blocks that were written since their region was measured: a row of the tile each. One more than there are.
+    std::uint16_t written_blocks[tile_blocks + 1];
 
     TileRun(const TileJob& of_job, std::uint32_t tile, Workspace& workspace)
         : job(of_job), targets(*of_job.targets), memory(workspace), clears(of_job.uncleared[tile] != 0) {
@@ -128,18 +122,13 @@ struct TileRun {
 
     void bring_in_depth() {
         depth_loaded = true;
-        const bool fills = clears && targets.depth_clears;
+        depth_is_clear = clears && targets.depth_clears;
         for (std::uint32_t sample = 0; sample < targets.samples; ++sample)
-            if (fills)
+            if (depth_is_clear)
                 fill_pixels(&targets.clear_depth, 1, plane_area(memory.depth, sample));
             else
                 load_pixels(depth_bytes(), depth_texels(sample), targets.depth_row_stride,
                             plane_area(memory.depth, sample));
-        for (int region = 0; region < regions_across * regions_across; ++region) {
-            const auto key = static_cast<std::int32_t>(targets.clear_depth);
-            region_low[region] = fills ? key : key_lowest, region_high[region] = fills ? key : key_highest;
-            region_writes[region] = fills ? 0 : 255;
-        }
     }
     void bring_in_stencil() {
         for (std::uint32_t sample = 0; sample < targets.samples; ++sample)
@@ -229,14 +218,15 @@ struct TileRun {
             stencil = memory.stencil[0];
             stencil_changed = true;
         }
-        const std::uint32_t compare_bits = compare_outcomes(plan.compare);
-        on_less = compare_bits & 1 ? 0xffff : 0, on_equal = compare_bits & 2 ? 0xffff : 0;
-        on_greater = compare_bits & 4 ? 0xffff : 0;
         entered_regions = ~0u;
         for (std::uint32_t i = 0; i < draw->color_count; ++i) entered_regions &= loaded_regions[draw->colors[i].target];
-        lowers_depth = !keeps_farther(plan.compare), raises_depth = !keeps_nearer(plan.compare);
+        if (depth) note_bounds(plan);
+        const auto larger = [](std::int32_t a, std::int32_t b) { return a > b ? a : b; };
+        limits[0] = larger(draw->x_begin - tile_x, 0), limits[1] = larger(draw->y_begin - tile_y, 0);
+        limits[2] = larger(~(draw->x_end - tile_x - 1), ~(width - 1));
+        limits[3] = larger(~(draw->y_end - tile_y - 1), ~(height - 1));
         simple_depth = targets.samples == 1 && !draw->late_tests && !stencil;
-        depth_low = plan.clamps ? plan.clamp_low : 0.0f;
+        depth_low = plan.clamps && plan.clamp_low > 0.0f ? plan.clamp_low : 0.0f;
         depth_high = plan.clamps ? plan.clamp_high : 1.0f;
     }
 
@@ -256,11 +246,27 @@ struct TileRun {
     }
 
     /// @param place  of a block, or of a quad in it
-    void depth_written(std::uint32_t place) { region_written((place >> 10) * regions_across + (place >> 6 & 3), 1); }
-    void region_written(std::uint32_t region, std::uint32_t blocks) {
-        region_writes[region] += blocks;
-        if (lowers_depth) region_low[region] = key_lowest;
-        if (raises_depth) region_high[region] = key_highest;
+    void depth_written(std::uint32_t place) {
+        written_blocks[place >> 8] = static_cast<std::uint16_t>(written_blocks[place >> 8] | 1u << (place >> 4 & 15));
+    }
+
+    /// What the depths that a draw begins to write mean for the bounds.
+    void note_bounds(const DepthStencilPlan& plan) {
+        const Bound kept = keeps_nearer(plan.compare)    ? Bound::above
+                           : keeps_farther(plan.compare) ? Bound::below
+                                                         : Bound::none;
+        const bool changes_nothing = !plan.depth_write || plan.compare == rhi::CompareOperation::equal ||
+                                     plan.compare == rhi::CompareOperation::never;
+        if (kept != bound && (!changes_nothing || draw->hierarchical)) {
+            bound = kept;
+            for (std::int32_t& at : region_bounds)
+                at = depth_is_clear          ? static_cast<std::int32_t>(targets.clear_depth)
+                     : bound == Bound::above ? key_highest
+                                             : key_lowest;
+            for (std::uint16_t& row : written_blocks) row = depth_is_clear ? 0 : 0xffff;
+            for (std::uint8_t& doubts : region_doubts) doubts = 0;
+        }
+        if (!changes_nothing) depth_is_clear = false;
     }
 
     void measure_region(std::int32_t region_x, std::int32_t region_y) {
@@ -273,15 +279,15 @@ struct TileRun {
                                            block_place(region_x * region_blocks + x, region_y * region_blocks + y));
                     low = minimum(low, keys), high = maximum(high, keys);
                 }
-        std::int32_t lows[16], highs[16];
-        store(lows, low), store(highs, high);
-        std::int32_t least = lows[0], most = highs[0];
-        for (int lane = 1; lane < 16; ++lane) {
-            least = lows[lane] < least ? lows[lane] : least;
-            most = highs[lane] > most ? highs[lane] : most;
-        }
+        std::int32_t keys[16];
+        store(keys, bound == Bound::above ? high : low);
+        std::int32_t extreme = keys[0];
+        for (const std::int32_t key : keys)
+            extreme = bound == Bound::above ? (key > extreme ? key : extreme) : (key < extreme ? key : extreme);
         const std::int32_t region = region_y * regions_across + region_x;
-        region_low[region] = least, region_high[region] = most, region_writes[region] = 0;
+        region_bounds[region] = extreme, region_doubts[region] = 0;
+        for (std::int32_t y = 0; y < region_blocks; ++y)
+            written_blocks[region_y * region_blocks + y] &= static_cast<std::uint16_t>(~(15u << (4 * region_x)));
     }
 
     /// Whether no sample of the record in pixels [x0, x1] x [y0, y1] of the tile, all in one region, passes the depth
@@ -290,7 +296,11 @@ struct TileRun {
     bool hidden(std::int32_t region_x, std::int32_t region_y, std::int32_t x0, std::int32_t x1, std::int32_t y0,
                 std::int32_t y1) {
         const std::int32_t region = region_y * regions_across + region_x;
-        if (region_writes[region] > 16) measure_region(region_x, region_y);
+        std::uint64_t rows;
+        std::memcpy(&rows, written_blocks + region_y * region_blocks, sizeof(rows));
+        const int blocks = __builtin_popcountll(rows & 0x000f000f000f000full << (4 * region_x));
+        // Measured when all of it is new, or when something is and it is asked about often.
+        if (blocks == 16 || (blocks != 0 && ++region_doubts[region] == 64)) measure_region(region_x, region_y);
         const rhi::CompareOperation operation = draw->depth_stencil.compare;
         const bool nearer = keeps_nearer(operation);
         const float inset = targets.samples == 1 ? 0.5f : 0.125f;
@@ -299,10 +309,10 @@ struct TileRun {
         const float y = static_cast<float>(tile_y + (lower ? y1 : y0)) + (lower ? 1.0f - inset : inset);
         const std::int32_t key = depth_key(targets.depth_layout, depth_at(x, y), depth_low, depth_high);
         switch (operation) {
-            case rhi::CompareOperation::less: return key >= region_high[region];
-            case rhi::CompareOperation::less_or_equal: return key > region_high[region];
-            case rhi::CompareOperation::greater: return key <= region_low[region];
-            default: return key < region_low[region];
+            case rhi::CompareOperation::less: return key >= region_bounds[region];
+            case rhi::CompareOperation::less_or_equal: return key > region_bounds[region];
+            case rhi::CompareOperation::greater: return key <= region_bounds[region];
+            default: return key < region_bounds[region];
         }
     }
 
@@ -335,19 +345,12 @@ struct TileRun {
     [[gnu::always_inline]] void append_block(std::uint32_t stream_index, std::uint32_t place, std::uint32_t live,
                                              const std::uint8_t* covered, const std::uint8_t* alive) {
         Stream& stream = memory.streams[stream_index];
-        if (stream.quads + 4 > stream_quads) flush_stream(stream_index);
         const std::uint32_t region = (place >> 10) * regions_across + (place >> 6 & 3);
         if ((entered_regions >> region & 1) == 0) enter_region(region);
         const PrimitiveData* const from = &current_primitive();
         const std::uint32_t first = stream.quads;
-        // All four, one behind the other, and then only those with a pixel count.
-        const Int4 pixels = (static_cast<std::int32_t>(live) >> Int4{0, 4, 8, 12}) & 15;
-        const Int4 entries =
-            (pixels << static_cast<int>(Stream::live_shift)) + (static_cast<std::int32_t>(place) + Int4{0, 4, 8, 12});
-        const std::uint32_t any = (live | live >> 1 | live >> 2 | live >> 3) & 0x1111;
-        const std::uint32_t used = (any | any >> 3 | any >> 6 | any >> 9) & 15;
-        for (int quad = 0; quad < 4; ++quad) stream.primitives[first + static_cast<std::uint32_t>(quad)] = from;
-        store4(stream.places + first, __builtin_shuffle(entries, load4(quad_order[used])));
+        for (std::uint32_t quad = 0; quad < 4; ++quad) stream.primitives[first + quad] = from;
+        const std::uint32_t used = append_quads(stream, place, live);
         if (covered) {
             std::uint32_t next = first;
             for (std::uint32_t quad = 0; quad < 4; ++quad) {
@@ -356,19 +359,45 @@ struct TileRun {
                 next += used >> quad & 1;
             }
         }
-        stream.quads = first + static_cast<std::uint32_t>(__builtin_popcount(used));
+        if (stream.quads >= stream_quads) flush_stream(stream_index, stream_quads);
+    }
+    /// The same for the four blocks at the corners of two by two, with one sample; `live` may be zero.
+    /// @param regions  one bit for each that a pixel lies in
+    [[gnu::always_inline]] void append_four_blocks(std::uint32_t place, const std::uint32_t (&live)[4],
+                                                   std::uint32_t regions) {
+        for (std::uint32_t fresh = regions & ~entered_regions; fresh != 0; fresh &= fresh - 1)
+            enter_region(static_cast<std::uint32_t>(__builtin_ctz(fresh)));
+        Stream& stream = memory.streams[0];
+        const PrimitiveData* const from = &current_primitive();
+        for (std::uint32_t quad = 0; quad < 16; ++quad) stream.primitives[stream.quads + quad] = from;
+        for (std::uint32_t block = 0; block < 4; ++block)
+            append_quads(stream, place + four_blocks[block], live[block]);
+        if (stream.quads >= stream_quads) flush_stream(0, stream_quads);
+    }
+    /// @return the quads that have a pixel, one bit for each
+    NACRE_LANES_INLINE static std::uint32_t append_quads(Stream& stream, std::uint32_t place, std::uint32_t live) {
+        // All four, one behind the other, and then only those with a pixel count.
+        const Int4 pixels = (static_cast<std::int32_t>(live) >> Int4{0, 4, 8, 12}) & 15;
+        const Int4 entries =
+            (pixels << static_cast<int>(Stream::live_shift)) + (static_cast<std::int32_t>(place) + Int4{0, 4, 8, 12});
+        const std::uint32_t any = (live | live >> 1 | live >> 2 | live >> 3) & 0x1111;
+        const std::uint32_t used = (any | any >> 3 | any >> 6 | any >> 9) & 15;
+        store4(stream.places + stream.quads, __builtin_shuffle(entries, load4(quad_order[used])));
+        stream.quads += static_cast<std::uint32_t>(__builtin_popcount(used));
+        return used;
     }
 
     void flush() {
         for (std::uint32_t sample = 0; sample < targets.samples; ++sample)
-            if (memory.streams[sample].quads != 0) flush_stream(sample);
+            if (memory.streams[sample].quads != 0) flush_stream(sample, memory.streams[sample].quads);
     }
 
-    void flush_stream(std::uint32_t stream_index) {
+    /// Runs the fragment function for the first quads: all, or `stream_quads`.
+    void flush_stream(std::uint32_t stream_index, std::uint32_t quads) {
         Stream& stream = memory.streams[stream_index];
         const std::uint32_t quads_in_batch = job.lanes / 4;
-        const std::uint32_t count = (stream.quads + quads_in_batch - 1) / quads_in_batch;
-        for (std::uint32_t quad = stream.quads; quad % quads_in_batch != 0; ++quad) {
+        const std::uint32_t count = (quads + quads_in_batch - 1) / quads_in_batch;
+        for (std::uint32_t quad = quads; quad % quads_in_batch != 0; ++quad) {
             stream.primitives[quad] = stream.primitives[0];
             stream.places[quad] = stream.places[0] & Stream::place_mask;
             std::memset(stream.covered[quad], 0, 4), std::memset(stream.alive[quad], 0, 4);
@@ -385,7 +414,13 @@ struct TileRun {
             else
                 resolve(memory.batches[i], stream, stream_index, first, places + first, quads_in_batch);
         }
-        stream.quads = 0;
+        stream.quads -= quads;
+        if (stream.quads == 0) return;
+        std::memcpy(stream.primitives, stream.primitives + quads, 16 * sizeof(stream.primitives[0]));
+        std::memcpy(stream.places, stream.places + quads, 16 * sizeof(stream.places[0]));
+        if (targets.samples == 1) return;
+        std::memcpy(stream.covered, stream.covered + quads, 16 * sizeof(stream.covered[0]));
+        std::memcpy(stream.alive, stream.alive + quads, 16 * sizeof(stream.alive[0]));
     }
 
     [[gnu::always_inline]] void fill_batch(FragmentBatch& batch, const Stream& stream, std::uint32_t stream_index,
