@@ -22,10 +22,10 @@ const Kernels& choose_kernels(std::uint32_t limit) {
 namespace {
 
 /// A chunk is what one task takes through the first half: small enough that all threads get some, large enough that
-/// vertices are shared and bins pay.
-constexpr std::uint32_t chunk_primitives = 512;
-/// A slab goes through both halves together, which bounds memory; its vertices and records fit the last cache level.
-constexpr std::uint32_t slab_primitives = 32 * 1024;
+/// vertices are shared and bins pay: each tile looks at the bins of each chunk.
+constexpr std::uint32_t least_chunk_primitives = 512, most_chunk_primitives = 2048;
+/// A slab goes through both halves together, which bounds memory. Tiles take part in each slab anew.
+constexpr std::uint32_t slab_primitives = 64 * 1024;
 constexpr std::uint32_t slab_draws = 16 * 1024;
 static_assert(slab_draws <= most_draws);
 /// Vertex functions with side effects run once for each index as long as an instance is not larger than this.
@@ -75,7 +75,7 @@ struct Rasterizer::State {
 
     Workspace& workspace(std::uint32_t thread) { return *reinterpret_cast<Workspace*>(workspaces[thread].data()); }
 
-    Chunk& open_chunk() {
+    Chunk& open_chunk(std::uint32_t chunk_primitives) {
         if (chunk_count == 0 || chunks[chunk_count - 1]->primitive_count >= chunk_primitives) {
             if (chunk_count == chunks.size()) chunks.push_back(std::make_unique<Chunk>());
             Chunk& chunk = *chunks[chunk_count++];
@@ -100,6 +100,8 @@ struct Rasterizer::State {
             return;
         if (draw_count == slab_draws) flush(false);
         std::uint32_t index = enqueue(state, call);
+        const std::uint32_t chunk_primitives = std::clamp(
+            count / (8 * scheduler.thread_count()), least_chunk_primitives, most_chunk_primitives);
         const bool whole = pipeline.vertex.has_side_effects && count <= largest_whole_instance;
         for (std::uint32_t instance = 0; instance < call.instance_count; ++instance) {
             for (std::uint32_t first = 0; first < count;) {
@@ -111,7 +113,7 @@ struct Rasterizer::State {
                     flush(false);
                     index = enqueue(state, call);
                 }
-                Chunk& chunk = open_chunk();
+                Chunk& chunk = open_chunk(chunk_primitives);
                 const std::uint32_t room = whole ? count : chunk_primitives - chunk.primitive_count;
                 const std::uint32_t part = std::min(count - first, room);
                 chunk.segments.push_back({index, call.first_instance + instance, first, part});

@@ -133,6 +133,13 @@ NACRE_LANES_INLINE Ints shift_right(const Ints& a, int count) {
         (IntRegister)((UintRegister)a.part[i] >> (UintRegister{} + static_cast<std::uint32_t>(count)));
     return result;
 }
+template <int count>
+NACRE_LANES_INLINE Ints shift_right_signed(const Ints& a) {
+    Ints result;
+    NACRE_EACH result.part[i] = a.part[i] >> count;
+    return result;
+}
+alignas(64) constexpr std::int32_t lane_numbers[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 NACRE_LANES_INLINE Floats to_floats(const Ints& a) {
     Floats result;
     NACRE_EACH result.part[i] = __builtin_convertvector(a.part[i], FloatRegister);

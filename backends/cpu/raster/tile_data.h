@@ -17,7 +17,8 @@
 
 namespace nacre::cpu::raster {
 
-inline constexpr std::int32_t tile_size = 64;    ///< Pixels, both ways.
+inline constexpr int tile_bits = 6;
+inline constexpr std::int32_t tile_size = 1 << tile_bits;  ///< Pixels, both ways.
 inline constexpr std::int32_t tile_blocks = 16;  ///< Blocks of 4x4 pixels in a row of a tile.
 inline constexpr std::int32_t tile_pixels = tile_size * tile_size;
 inline constexpr std::int32_t subpixel_bits = 8;
@@ -230,10 +231,37 @@ struct VertexFinish {
     SetupVertex* setup;
 };
 
+/// Slopes beyond this come from triangles without area; flat is the best that can be said of them.
+inline constexpr double steepest_slope = 1e30;
+/// Twice the area, in pixels: below, the rounding of coordinates decides about the triangle.
+inline constexpr double thin_area = 1.0 / 4096.0;
+
+/// Up to sixteen triangles of a draw with one sample, filled.
+struct TriangleSetup {
+    const SetupVertex* vertices;
+    const std::byte* screen;  ///< What SetupVertex::offset counts from.
+    rhi::CullMode cull;
+    bool front_is_clockwise;
+    std::int32_t x_begin, x_end, y_begin, y_end;  ///< As in DrawPlan.
+    float bias, bias_slope, bias_clamp;
+    double bias_unit;         ///< What `bias` counts; 0: that of the depth itself, which is a float.
+    std::uint32_t draw_bits;  ///< Record::bits of the draw.
+    std::uint32_t first_primitive;
+    std::uint32_t count;
+    std::uint32_t locals[3][16];  ///< Corners, into `vertices`; valid in all sixteen.
+
+    // Results, one bit for each triangle.
+    std::uint32_t drawn;    ///< Its record and tiles are made.
+    std::uint32_t special;  ///< Must be clipped, or rounding decides about it: not done here. All others cover nothing.
+    alignas(64) Record records[16];
+    alignas(64) std::int32_t left[16], right[16], top[16], bottom[16];  ///< Tiles, inclusive.
+};
+
 /// The functions that exist once for each instruction set. All sets give the same bits.
 struct Kernels {
     const char* name;
     void (*finish_vertices)(const VertexFinish& finish);
+    void (*set_up_triangles)(TriangleSetup& work);
     void (*draw_tile)(const TileJob& job, std::uint32_t tile, Workspace& workspace);
 };
 extern const Kernels kernels_baseline;

@@ -2,6 +2,7 @@
 // Compiled once for each instruction set, with NACRE_RASTER_KERNELS as the name of the result. Nothing here may have
 // external linkage but that name, and nothing from the standard library may be called that is not inlined for certain.
 #include "backends/cpu/raster/tile_coverage.h"
+#include "backends/cpu/raster/triangle_lanes.h"
 #include "backends/cpu/raster/vertex_lanes.h"
 
 namespace nacre::cpu::raster {
@@ -65,6 +66,6 @@ void draw_tile(const TileJob& job, std::uint32_t tile, Workspace& workspace) {
 }  // namespace
 
 extern const Kernels NACRE_RASTER_KERNELS;
-const Kernels NACRE_RASTER_KERNELS = {NACRE_RASTER_NAME, finish_vertices, draw_tile};
+const Kernels NACRE_RASTER_KERNELS = {NACRE_RASTER_NAME, finish_vertices, set_up_triangles, draw_tile};
 
 }  // namespace nacre::cpu::raster
