@@ -9,6 +9,9 @@
 namespace nacre::cpu::raster {
 namespace {
 
+/// Color targets of this size and more are written past the caches.
+constexpr std::uint64_t cached_color_bytes = 16 << 20;
+
 struct ChannelBits {
     std::uint32_t first, count;
 };
@@ -152,6 +155,10 @@ TargetSet target_set(const RenderTargets& targets) {
         }
         if (level.data) set.color_planes += words * set.samples;
     }
+    std::uint64_t color_bytes = 0;
+    for (std::uint32_t i = 0; i < set.color_count; ++i)
+        color_bytes += std::uint64_t{set.colors[i].texel_bytes} * set.width * set.height * set.samples;
+    set.streams_colors = color_bytes >= cached_color_bytes;
     const ImageView& view = targets.depth_stencil;
     switch (view.format) {
         case rhi::Format::d16_unorm: set.depth_layout = DepthLayout::unorm16; break;

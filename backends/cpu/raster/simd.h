@@ -304,6 +304,19 @@ NACRE_LANES_INLINE Int4 load4(const void* from) {
     return result;
 }
 NACRE_LANES_INLINE void store4(void* to, Int4 value) { std::memcpy(to, &value, sizeof(value)); }
+/// Past the caches, which need not read the rest of the line then; seen by others after `end_streams`. Aligned to 16 bytes.
+NACRE_LANES_INLINE void stream4(void* to, Int4 value) {
+#if defined(__x86_64__)
+    _mm_stream_si128(static_cast<__m128i*>(to), (__m128i)value);
+#else
+    store4(to, value);
+#endif
+}
+NACRE_LANES_INLINE void end_streams() {
+#if defined(__x86_64__)
+    _mm_sfence();
+#endif
+}
 
 /// Rows become columns.
 template <typename Row>

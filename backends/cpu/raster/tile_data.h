@@ -116,6 +116,7 @@ struct TargetSet {
     ColorTarget colors[8];
     std::uint32_t color_count;
     std::uint32_t color_planes;  ///< Words of all targets and samples.
+    bool streams_colors;         ///< They are larger than what caches keep for whoever reads them.
     DepthLayout depth_layout;
     std::byte* depth;
     std::uint64_t depth_sample_stride;

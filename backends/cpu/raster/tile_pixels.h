@@ -44,8 +44,15 @@ NACRE_LANES_INLINE void load_row(const std::byte* from, Int4* words) {
         transpose(words[0], words[1], words[2], words[3]);
     }
 }
-template <int bytes>
+/// @param streams  past the caches; rows must be aligned to 16 bytes. For texels of at least 4 bytes.
+template <int bytes, bool streams>
 NACRE_LANES_INLINE void store_row(std::byte* to, const Int4* words) {
+    const auto put = [](std::byte* at, Int4 value) {
+        if constexpr (streams)
+            stream4(at, value);
+        else
+            store4(at, value);
+    };
     if constexpr (bytes == 1) {
         using Bytes [[gnu::vector_size(4)]] = std::uint8_t;
         const Bytes texels = __builtin_convertvector(words[0], Bytes);
@@ -55,14 +62,14 @@ NACRE_LANES_INLINE void store_row(std::byte* to, const Int4* words) {
         const Halves texels = __builtin_convertvector(words[0], Halves);
         std::memcpy(to, &texels, sizeof(texels));
     } else if constexpr (bytes == 4) {
-        store4(to, words[0]);
+        put(to, words[0]);
     } else if constexpr (bytes == 8) {
-        store4(to, __builtin_shufflevector(words[0], words[1], 0, 4, 1, 5));
-        store4(to + 16, __builtin_shufflevector(words[0], words[1], 2, 6, 3, 7));
+        put(to, __builtin_shufflevector(words[0], words[1], 0, 4, 1, 5));
+        put(to + 16, __builtin_shufflevector(words[0], words[1], 2, 6, 3, 7));
     } else {
         Int4 texels[4] = {words[0], words[1], words[2], words[3]};
         transpose(texels[0], texels[1], texels[2], texels[3]);
-        for (int i = 0; i < 4; ++i) store4(to + 16 * i, texels[i]);
+        for (int i = 0; i < 4; ++i) put(to + 16 * i, texels[i]);
     }
 }
 
@@ -108,7 +115,7 @@ inline void load_pixels(const std::byte* from, std::uint32_t row_stride, const T
     }
 }
 
-template <int bytes>
+template <int bytes, bool streams>
 inline void store_pixels(std::byte* to, std::uint32_t row_stride, const TileArea& area) {
     constexpr int words = bytes < 4 ? 1 : bytes / 4;
     for (std::int32_t y = 0; y < area.height; y += 4) {
@@ -126,7 +133,7 @@ inline void store_pixels(std::byte* to, std::uint32_t row_stride, const TileArea
                     std::memcpy(halves, block + 16 * word, 8), std::memcpy(halves + 1, block + 16 * word + 4, 8);
                     std::memcpy(all + word, halves, 16);
                 }
-                store_row<bytes>(texels, all);
+                store_row<bytes, streams>(texels, all);
             }
         }
         for (std::int32_t x = 4 * whole; x < area.width; x += 4)
@@ -174,13 +181,19 @@ inline void load_pixels(std::uint32_t bytes, const std::byte* from, std::uint32_
         default: load_pixels<16>(from, row_stride, area); break;
     }
 }
-inline void store_pixels(std::uint32_t bytes, std::byte* to, std::uint32_t row_stride, const TileArea& area) {
-    switch (bytes) {
-        case 1: store_pixels<1>(to, row_stride, area); break;
-        case 2: store_pixels<2>(to, row_stride, area); break;
-        case 4: store_pixels<4>(to, row_stride, area); break;
-        case 8: store_pixels<8>(to, row_stride, area); break;
-        default: store_pixels<16>(to, row_stride, area); break;
+/// @param streams  past the caches, where rows are aligned for that
+inline void store_pixels(std::uint32_t bytes, std::byte* to, std::uint32_t row_stride, const TileArea& area,
+                         bool streams) {
+    const bool aligned = ((reinterpret_cast<std::uintptr_t>(to) | row_stride) & 15) == 0;
+    switch (streams && aligned && bytes >= 4 ? bytes + 1 : bytes) {
+        case 1: store_pixels<1, false>(to, row_stride, area); break;
+        case 2: store_pixels<2, false>(to, row_stride, area); break;
+        case 4: store_pixels<4, false>(to, row_stride, area); break;
+        case 5: store_pixels<4, true>(to, row_stride, area); break;
+        case 8: store_pixels<8, false>(to, row_stride, area); break;
+        case 9: store_pixels<8, true>(to, row_stride, area); break;
+        case 16: store_pixels<16, false>(to, row_stride, area); break;
+        default: store_pixels<16, true>(to, row_stride, area); break;
     }
 }
 

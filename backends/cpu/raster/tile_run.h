@@ -173,7 +173,7 @@ struct TileRun {
                     const TileArea area =
                         color_area(target, sample, x, y, is_whole ? tile_size : region_size, region_size);
                     if (is_loaded)
-                        store_pixels(target.texel_bytes, to, target.row_stride, area);
+                        store_pixels(target.texel_bytes, to, target.row_stride, area, targets.streams_colors);
                     else
                         fill_texels(target.clear, target.texel_bytes, to, target.row_stride, area.width, area.height);
                 }
@@ -185,17 +185,18 @@ struct TileRun {
         flush();
         for (std::uint32_t i = 0; i < targets.color_count; ++i)
             if (targets.colors[i].data) store_colors(targets.colors[i], loaded_regions[i]);
+        if (targets.streams_colors) end_streams();
         const bool depth_clears = clears && targets.depth_clears, stencil_clears = clears && targets.stencil_clears;
         for (std::uint32_t sample = 0; sample < targets.samples; ++sample) {
             if (depth_changed || (depth_clears && depth_loaded))
                 store_pixels(depth_bytes(), depth_texels(sample), targets.depth_row_stride,
-                             plane_area(memory.depth, sample));
+                             plane_area(memory.depth, sample), false);
             else if (depth_clears)
                 fill_texels(&targets.clear_depth, depth_bytes(), depth_texels(sample), targets.depth_row_stride, width,
                             height);
             if (stencil_changed || (stencil_clears && stencil_loaded))
                 store_pixels(1, stencil_texels(sample), targets.stencil_row_stride,
-                             plane_area(memory.stencil, sample));
+                             plane_area(memory.stencil, sample), false);
             else if (stencil_clears)
                 fill_texels(&targets.clear_stencil, 1, stencil_texels(sample), targets.stencil_row_stride, width,
                             height);
