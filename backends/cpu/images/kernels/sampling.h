@@ -13,23 +13,27 @@ NACRE_INLINE void border_values(rhi::BorderColor color, float& rgb, float& alpha
     alpha = color == rhi::BorderColor::transparent_black ? 0.0f : 1.0f;
 }
 
-/// Weighted mean of a footprint.
+/// Weighted mean of a footprint of two texels or more.
 template <int W, Codec C>
 [[gnu::noinline]] void filter_taps(const Source& source, const Taps<W>& taps, rhi::BorderColor border, Floats<W>* out) {
     const FormatPlan& plan = *source.plan;
     const int channels = raw_channels<C>(plan);
     Floats<W> sum[4] = {};
-    for (int tap = 0; tap < taps.count; ++tap) {
-        Floats<W> texel[4];
-        load_raw<W, C>(source, taps.places[tap], texel);
-        if (taps.has_border) {
-            float rgb, alpha;
-            border_values(border, rgb, alpha);
-            for (int c = 0; c < channels; ++c) {
-                texel[c] = taps.is_border[tap] ? splat<W>((c == 3 ? alpha : rgb) * raw_scale<C>(plan, c)) : texel[c];
+    for (int first = 0; first < taps.count; first += 2) {
+        Floats<W> texels[2][4];
+        load_two_raw<W, C>(source, taps.places[first], taps.places[first + 1], texels);
+        for (int i = 0; i < 2; ++i) {
+            const int tap = first + i;
+            Floats<W>* const texel = texels[i];
+            if (taps.has_border) {
+                float rgb, alpha;
+                border_values(border, rgb, alpha);
+                for (int c = 0; c < channels; ++c) {
+                    texel[c] = taps.is_border[tap] ? splat<W>((c == 3 ? alpha : rgb) * raw_scale<C>(plan, c)) : texel[c];
+                }
             }
+            for (int c = 0; c < channels; ++c) sum[c] = sum[c] + taps.weights[tap] * texel[c];
         }
-        for (int c = 0; c < channels; ++c) sum[c] = sum[c] + taps.weights[tap] * texel[c];
     }
     for (int c = 0; c < channels; ++c) out[c] = sum[c];
     finish_raw<W, C>(plan, out);

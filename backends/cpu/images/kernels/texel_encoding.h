@@ -30,8 +30,7 @@ NACRE_INLINE Ints<W> encode_channel(const ChannelPlan& channel, Ints<W> value) {
             const Floats<W> known = x == x ? x : splat<W>(0.0f);
             return scale_and_round<W>(clamp<W>(known, splat<W>(-1.0f), splat<W>(1.0f)), channel.bits - 1u);
         }
-        case ChannelCoding::half:
-            return floats_to_small<W>(x, 10, false) | (Ints<W>)(((Uints<W>)value >> 16) & 0x8000u);
+        case ChannelCoding::half: return floats_to_halves<W>(x);
         case ChannelCoding::small_float: {
             const Ints<W> code = floats_to_small<W>(x, channel.bits - 5, true);
             return x <= 0.0f ? splat<W>(0) : code;
