@@ -169,6 +169,28 @@ NACRE_INLINE Floats<W> square_root(Floats<W> x) {
     return root;
 }
 
+/// x / divisor as IEEE 754 rounds it; the divisor is a whole number below 2^24 and |x| is 0 or above 2^-60. By the reciprocal
+/// and the exact remainder where there are fused operations: Markstein, "Computation of elementary functions on the IBM RISC
+/// System/6000 processor", 1990, theorem 7. Zero comes out with the sign +.
+template <int W>
+NACRE_INLINE Floats<W> quotient(Floats<W> x, float divisor) {
+#ifdef __FMA__
+    const float reciprocal = 1.0f / divisor;
+    const Floats<W> estimate = x * reciprocal;
+    const auto fused = [](Floats<W> a, Floats<W> b, Floats<W> c) -> Floats<W> {
+#ifdef __AVX512F__
+        if constexpr (W == 16) return (Floats<W>)_mm512_maskz_fmadd_ps(0xffff, (__m512)a, (__m512)b, (__m512)c);
+#endif
+        if constexpr (W == 8) return (Floats<W>)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
+        if constexpr (W == 4) return (Floats<W>)_mm_fmadd_ps((__m128)a, (__m128)b, (__m128)c);
+    };
+    const Floats<W> rest = fused(estimate, Floats<W>{} - divisor, x);
+    return fused(rest, Floats<W>{} + reciprocal, estimate);
+#else
+    return x / divisor + 0.0f;
+#endif
+}
+
 #ifdef __F16C__
 // The processor's conversions of halves, whose bits are those of the arithmetic in lane_math.h: NaN are made quiet and keep
 // what fits of their payload, and no mode of the processor flushes a subnormal half.

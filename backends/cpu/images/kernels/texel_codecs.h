@@ -281,7 +281,7 @@ NACRE_INLINE void finish_raw(const FormatPlan& plan, Floats<W>* channels) {
     const int count = raw_channels<C>(plan);
     for (int c = 0; c < count; ++c) {
         const float scale = raw_scale<C>(plan, c);
-        if (scale != 1.0f) channels[c] = channels[c] / scale;
+        if (scale != 1.0f) channels[c] = quotient<W>(channels[c], scale);
     }
     if constexpr (C == Codec::rgba8 || C == Codec::srgb8) {
         if (plan.red_is_third) {
