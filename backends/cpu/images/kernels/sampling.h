@@ -200,7 +200,7 @@ NACRE_INLINE void sample_level(const Sampling<W>& sampling, const LevelOfDetail<
 }
 
 /// Samples that are most common go a short way, with the same results: 2D images and arrays of them, in layouts whose texels
-/// are taken apart without choices, without borders, offsets and comparisons, and one filter for all levels of detail.
+/// are taken apart without choices, without borders, offsets and comparisons.
 template <int W>
 struct PlainSampling {
     const Invocation* call;
@@ -261,8 +261,9 @@ NACRE_INLINE void sample_plain_level(const PlainSampling<W>& sampling, const Lev
     });
 }
 
+/// False: not all lanes are filtered in the same way, and nothing was done.
 template <int W, Codec C>
-[[gnu::noinline]] void sample_plain_levels(const PlainSampling<W>& sampling) {
+[[gnu::noinline]] bool sample_plain_levels(PlainSampling<W>& sampling) {
     const Invocation& call = *sampling.call;
     const ImageView& image = *call.image;
     const rhi::SamplerDesc& sampler = call.sampler->desc;
@@ -270,10 +271,16 @@ template <int W, Codec C>
     LevelOfDetail<W> detail;
     Ints<W> level = splat<W>(0);
     Floats<W> next_weight = splat<W>(0.0f);
-    if (image.mip_count > 1 || sampler.max_anisotropy > 1.0f) {
+    sampling.is_linear = sampler.magnify == rhi::Filter::linear;
+    if (image.mip_count > 1 || sampler.magnify != sampler.minify || sampler.max_anisotropy > 1.0f) {
         const Floats<W> coordinates[2] = {sampling.s, sampling.t};
         level_of_detail<W>(call, coordinates, nullptr, 2, detail);
         select_levels<W>(detail.lambda, image.mip_count, sampler.mip == rhi::Filter::linear, level, next_weight);
+        if (sampler.magnify != sampler.minify) {
+            const std::uint32_t magnified = mask_bits<W>(detail.lambda <= 0.0f) & call.live;
+            if (magnified != 0 && magnified != call.live) return false;
+            if (magnified == 0) sampling.is_linear = !sampling.is_linear;
+        }
     }
     Floats<W> out[4];
     const Ints<W> has_next = next_weight > 0.0f;
@@ -281,7 +288,10 @@ template <int W, Codec C>
     const std::int32_t first = level[first_bit(call.live)];
     const bool is_one_level = (mask_bits<W>(level == first) & call.live) == call.live;
     sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(first), out);
-    if (is_one_level && next_bits == 0) return write_result<W>(call, out, live);
+    if (is_one_level && next_bits == 0) {
+        write_result<W>(call, out, live);
+        return true;
+    }
     if (is_one_level) {
         Floats<W> next[4];
         sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(first) + 1, next);
@@ -289,7 +299,8 @@ template <int W, Codec C>
             const Floats<W> sum = (splat<W>(0.0f) + out[c] * (1.0f - next_weight)) + next[c] * next_weight;
             out[c] = has_next ? sum : out[c];
         }
-        return write_result<W>(call, out, live);
+        write_result<W>(call, out, live);
+        return true;
     }
     for (int c = 0; c < 4; ++c) out[c] = splat<W>(0.0f);
     add_levels<W>(call, level, next_weight, [&](std::int32_t m, Ints<W> mask, Floats<W> weight) {
@@ -301,6 +312,7 @@ template <int W, Codec C>
         }
     });
     write_result<W>(call, out, live);
+    return true;
 }
 
 /// False: the sample is not plain, and nothing was done.
@@ -311,10 +323,8 @@ NACRE_INLINE bool sample_plain(const Invocation& call) {
     const bool is_array = image.dimension == rhi::ViewDimension::d2_array;
     if (!is_array && image.dimension != rhi::ViewDimension::d2) return false;
     if (call.has(image_offset) || call.has(image_compare) || call.has(image_integer)) return false;
-    if (sampler.address_u == rhi::AddressMode::clamp_to_border || sampler.address_v == rhi::AddressMode::clamp_to_border ||
-        sampler.magnify != sampler.minify) {
+    if (sampler.address_u == rhi::AddressMode::clamp_to_border || sampler.address_v == rhi::AddressMode::clamp_to_border)
         return false;
-    }
     // The finest level reaches farthest.
     Source source;
     if (!make_source(image, 0, source) || source.codec > Codec::float4) return false;
@@ -325,11 +335,11 @@ NACRE_INLINE bool sample_plain(const Invocation& call) {
     sampling.slice = splat<W>(0);
     if (is_array) sampling.slice = array_layer<W>(call.floats<W>(call.arguments->coordinates[2]), image.layer_count);
     sampling.u = sampler.address_u, sampling.v = sampler.address_v;
-    sampling.is_linear = sampler.magnify == rhi::Filter::linear;
+    bool is_done = false;
     visit_codec(source.codec, [&]<Codec C>() {
-        if constexpr (raw_words<C> != 0) sample_plain_levels<W, C>(sampling);
+        if constexpr (raw_words<C> != 0) is_done = sample_plain_levels<W, C>(sampling);
     });
-    return true;
+    return is_done;
 }
 
 /// False where the result of every lane is zero.
