@@ -17,6 +17,8 @@ namespace {
 
 /// Words from lane to lane up to which elements are taken as rows. More need more shuffles than gathers cost.
 constexpr std::uint32_t most_row_words = 16;
+/// Scalars from which on it pays to ask whether all lanes mean the same address, and up to which both ways are written out.
+constexpr std::uint32_t fewest_equal_scalars = 3, most_equal_scalars = 64;
 
 /// The rest of the elements of a stream: every second one of two vectors, from `first` on.
 std::vector<int> every_second(std::uint32_t lanes, int first) {
@@ -201,6 +203,48 @@ std::optional<std::vector<Component>> Emitter::load_rows(const Pointer& pointer)
         else values.push_back(from_word(Component(word), scalar_type(scalar)));
         if (scalar.kind != TypeKind::boolean) row_origins[values.back().value] = {origin, place};
     });
+    return values;
+}
+
+std::optional<std::vector<Component>> Emitter::load_where_equal(const Pointer& pointer) {
+    const Component& offset = pointer.dynamic_offset;
+    if (pointer.kind != Pointer::Kind::bytes || !pointer.base.is_uniform() || !offset || offset.is_uniform()) return {};
+    if (pointer.limit && !pointer.limit.is_uniform()) return {};
+    const std::uint32_t count = module.type(pointer.type).components;
+    if (count < fewest_equal_scalars || count > most_equal_scalars) return {};
+    llvm::Value* lane = first_lane(mask);
+    llvm::Value* one = builder.CreateExtractElement(offset.value, lane);
+    llvm::Value* differs = both(mask, builder.CreateICmpNE(offset.value, splat(one)));
+    Pointer alike = pointer;
+    alike.dynamic_offset = Component(one);
+    if (pointer.valid && !pointer.valid.is_uniform()) {
+        // An index out of range may give the offset of another that is not.
+        differs = builder.CreateOr(differs, both(mask, builder.CreateNot(pointer.valid.value)));
+        alike.valid = Component(builder.CreateExtractElement(pointer.valid.value, lane));
+    }
+    llvm::BasicBlock* equal = llvm::BasicBlock::Create(context, "equal", function_);
+    llvm::BasicBlock* different = llvm::BasicBlock::Create(context, "different", function_);
+    llvm::BasicBlock* after = llvm::BasicBlock::Create(context, "loaded", function_);
+    builder.CreateCondBr(any(differs), different, equal);
+    const auto load_each = [&](llvm::BasicBlock* block, const Pointer& from) {
+        builder.SetInsertPoint(block);
+        std::vector<llvm::Value*> values;
+        visit_layout(from, from.type, 0, [&](const Pointer& at, std::int64_t extra, const Type& scalar) {
+            values.push_back(widen(load_bytes(at, extra, scalar)));
+        });
+        builder.CreateBr(after);
+        return values;
+    };
+    const std::vector<llvm::Value*> once = load_each(equal, alike);
+    const std::vector<llvm::Value*> gathered = load_each(different, pointer);
+    builder.SetInsertPoint(after);
+    std::vector<Component> values;
+    for (std::size_t i = 0; i < once.size(); ++i) {
+        llvm::PHINode* either = builder.CreatePHI(once[i]->getType(), 2);
+        either->addIncoming(once[i], equal);
+        either->addIncoming(gathered[i], different);
+        values.emplace_back(either);
+    }
     return values;
 }
 

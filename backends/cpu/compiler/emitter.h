@@ -256,6 +256,8 @@ class Emitter {
     std::optional<std::vector<Component>> load_rows(const Pointer& pointer);
     /// False: nothing was stored, for there are no rows.
     bool store_rows(const Pointer& pointer, const std::vector<Component>& values);
+    /// Loads of several scalars by addresses that may differ from lane to lane, but mostly do not.
+    std::optional<std::vector<Component>> load_where_equal(const Pointer& pointer);
     llvm::Value* row_start(const Pointer& pointer, const RowLayout& rows);
     /// Where a value of `load_rows` comes from: word `word` of the stream that begins with `stream`.
     struct RowOrigin {
