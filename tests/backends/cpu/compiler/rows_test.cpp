@@ -60,7 +60,8 @@ const std::vector<Index> indices{
     {"neighbors", "i + 3u", [](std::uint32_t i) { return i + 3; }},
     {"before_the_first", "i - 2u", [](std::uint32_t i) { return i - 2; }},
     {"in_steps", "numbers[i] / 23u * 7u", [](std::uint32_t i) { return i / 23 * 7; }},
-    {"same_or_outside", "numbers[i] < 40u ? 5u : ~3u", [](std::uint32_t i) { return i < 40 ? 5u : ~3u; }},
+    // Both are 5 elements from the begin if bytes are counted in 32 bits.
+    {"same_or_outside", "numbers[i] < 40u ? 5u : 0x20000005u", [](std::uint32_t i) { return i < 40 ? 5u : 0x20000005u; }},
     {"scattered", "numbers[i] * 37u % 150u", [](std::uint32_t i) { return i * 37 % 150; }},
 };
 
