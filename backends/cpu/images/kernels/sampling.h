@@ -130,7 +130,7 @@ template <int W, Codec C>
 [[gnu::noinline]] bool sample_face(const Source& source, const CubeProjection<W>& cube, Ints<W> first_slice, Floats<W>* out) {
     const CubeCorner<W> corner = cube_corner<W>(source.width, cube);
     if (corner.crosses) return false;
-    constexpr int channels = C == Codec::word ? 1 : 4;
+    const int channels = raw_channels<C>(*source.plan);
     const Place<W> place = place_texel<W>(source, corner.x, corner.y, first_slice + cube.face);
     Floats<W> sum[4] = {};
     for (int row = 0; row < 2; ++row) {
@@ -279,7 +279,7 @@ template <int W, Codec C>
         place.offset = x.first * bytes + y.first * source.row_stride + slice;
         load_raw<W, C>(source, place, out);
     } else {
-        constexpr int channels = C == Codec::word ? 1 : 4;
+        const int channels = raw_channels<C>(plan);
         const AxisTaps<W> x = linear_axis<W>(s, source.width, sampling.u, nullptr);
         const AxisTaps<W> y = linear_axis<W>(t, source.height, sampling.v, nullptr);
         const Ints<W> left = x.first * bytes, right = x.second * bytes;
