@@ -13,6 +13,8 @@ namespace {
 
 /// From here on pages come from the system, which zeroes them when they are first touched.
 constexpr std::uint64_t mapping_threshold = 256 * 1024;
+/// From here on a large page of the system (2 MiB on x86-64) fits in, whatever the alignment.
+constexpr std::uint64_t large_page_threshold = 4 * 1024 * 1024;
 
 }  // namespace
 
@@ -33,6 +35,10 @@ MemoryBlock::MemoryBlock(std::shared_ptr<HostMemory> memory, std::uint64_t size)
     if (is_mapped_) {
         void* pages = mmap(nullptr, allocated, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
         data_ = pages == MAP_FAILED ? nullptr : static_cast<std::byte*>(pages);
+#ifdef MADV_HUGEPAGE
+        // Accesses in two dimensions touch many pages. Only a hint: where the system knows no large pages nothing changes.
+        if (data_ && allocated >= large_page_threshold) madvise(pages, allocated, MADV_HUGEPAGE);
+#endif
     } else {
         data_ = static_cast<std::byte*>(std::aligned_alloc(64, allocated));
         if (data_) std::memset(data_, 0, allocated);

@@ -96,6 +96,7 @@ FormatPlan make_plan(Format format) {
     if (facts.channels == 1 && bits == 32) plan.codec = Codec::word;
     if (facts.channels == 4 && bits == 32) plan.codec = Codec::float4;
     if (format == Format::rgba16_float) plan.codec = Codec::half4;
+    if (format == Format::rg16_float) plan.codec = Codec::half2;
     if (format == Format::rgba8_unorm || format == Format::bgra8_unorm) plan.codec = Codec::rgba8;
     if (format == Format::rgba8_srgb || format == Format::bgra8_srgb) plan.codec = Codec::srgb8;
     return plan;

@@ -10,13 +10,14 @@
 
 namespace nacre::cpu {
 
-/// Ways to read a texel. The first five are `general` for layouts that matter most, without its choices for each
+/// Ways to read a texel. The first six are `general` for layouts that matter most, without its choices for each
 /// channel.
 enum class Codec : std::uint8_t {
     none,     ///< Cannot be read as color (undefined, unknown).
     word,     ///< One channel of 32 bits: r32, d32.
     rgba8,    ///< rgba8_unorm and bgra8_unorm.
     srgb8,    ///< rgba8_srgb and bgra8_srgb.
+    half2,    ///< rg16_float
     half4,    ///< rgba16_float
     float4,   ///< rgba32
     general,  ///< By `FormatPlan::channels`.

@@ -101,37 +101,62 @@ constexpr CubeEdges make_cube_edges() {
 }
 constexpr CubeEdges cube_edges = make_cube_edges();
 
-NACRE_INLINE std::int32_t apply_rule(CubeEdge::Rule rule, std::int32_t along, std::int32_t n) {
-    switch (rule) {
-        case CubeEdge::zero: return 0;
-        case CubeEdge::last: return n - 1;
-        case CubeEdge::along: return along;
-        default: return n - 1 - along;
+/// The edges as words for gathers: face, and the rules for x and y in bits 8 and 16.
+struct PackedCubeEdges {
+    std::int32_t words[6 * 4];
+};
+constexpr PackedCubeEdges packed_cube_edges = [] {
+    PackedCubeEdges packed{};
+    for (int i = 0; i < 24; ++i) {
+        const CubeEdge& edge = cube_edges.edges[i / 4][i % 4];
+        packed.words[i] = edge.face | edge.x << 8 | edge.y << 16;
     }
+    return packed;
+}();
+
+template <int W>
+NACRE_INLINE Ints<W> apply_rule(Ints<W> rule, Ints<W> along, std::int32_t n) {
+    const Ints<W> from = (rule & 2) != 0 ? along : splat<W>(0);
+    return (rule & 1) != 0 ? n - 1 - from : from;
 }
 
-/// Moves texels that lie one step outside of their face to the neighboring face. Returns true for those outside in both
-/// directions.
+/// Moves texels that lie one step outside of their face to the neighboring face. `is_corner`: those outside in both
+/// directions, which stay at their corner.
 template <int W>
-[[gnu::noinline]] void cross_edges(std::int32_t n, Ints<W>& x, Ints<W>& y, Ints<W>& face, Ints<W>& is_corner) {
-    is_corner = splat<W>(0);
-    for (int lane = 0; lane < W; ++lane) {
-        const std::int32_t i = x[lane], j = y[lane];
-        const bool outside_x = i < 0 || i >= n, outside_y = j < 0 || j >= n;
-        if (!outside_x && !outside_y) continue;
-        if (outside_x && outside_y) {
-            is_corner[lane] = -1;
-            x[lane] = i < 0 ? 0 : n - 1;
-            y[lane] = j < 0 ? 0 : n - 1;
-            continue;
-        }
-        const int edge = outside_x ? (i < 0 ? 0 : 1) : (j < 0 ? 2 : 3);
-        const CubeEdge& over = cube_edges.edges[face[lane]][edge];
-        const std::int32_t along = outside_x ? j : i;
-        x[lane] = apply_rule(over.x, along, n);
-        y[lane] = apply_rule(over.y, along, n);
-        face[lane] = over.face;
-    }
+NACRE_INLINE void cross_edges(std::int32_t n, Ints<W>& x, Ints<W>& y, Ints<W>& face, Ints<W>& is_corner) {
+    const Ints<W> outside_x = (x < 0) | (x >= n), outside_y = (y < 0) | (y >= n);
+    is_corner = outside_x & outside_y;
+    const Ints<W> edge_x = x < 0 ? splat<W>(0) : splat<W>(1), edge_y = y < 0 ? splat<W>(2) : splat<W>(3);
+    const Ints<W> crosses = outside_x ^ outside_y;
+    const Ints<W> over = gather_words<W>(reinterpret_cast<const std::byte*>(packed_cube_edges.words),
+                                         (face * 4 + (outside_x ? edge_x : edge_y)) * 4);
+    const Ints<W> along = outside_x ? y : x;
+    const Ints<W> inside_x = clamp<W>(x, 0, n - 1), inside_y = clamp<W>(y, 0, n - 1);
+    x = crosses ? apply_rule<W>((over >> 8) & 3, along, n) : inside_x;
+    y = crosses ? apply_rule<W>(over >> 16, along, n) : inside_y;
+    face = crosses ? over & 7 : face;
+}
+
+/// Where a linear footprint on a face begins, and the weights of its second column and row.
+template <int W>
+struct CubeCorner {
+    Ints<W> x, y;
+    Floats<W> fx, fy;
+    bool crosses;  ///< In some lane it reaches over an edge.
+};
+template <int W>
+NACRE_INLINE CubeCorner<W> cube_corner(std::int32_t n, const CubeProjection<W>& cube) {
+    const auto texels = [&](Floats<W> s) {
+        return clamp<W>(s * static_cast<float>(n), splat<W>(0.0f), splat<W>(static_cast<float>(n)));
+    };
+    const Floats<W> u = texels(cube.s) - 0.5f, v = texels(cube.t) - 0.5f;
+    const Floats<W> whole_u = floor_small<W>(u), whole_v = floor_small<W>(v);
+    CubeCorner<W> corner;
+    corner.x = truncate<W>(whole_u), corner.y = truncate<W>(whole_v);
+    corner.fx = u - whole_u, corner.fy = v - whole_v;
+    corner.crosses =
+        mask_bits<W>((corner.x < 0) | (corner.y < 0) | (corner.x + 1 >= n) | (corner.y + 1 >= n)) != 0;
+    return corner;
 }
 
 /// Footprint on a cube. `first_slice` is the slice of face 0 of each lane's cube.
@@ -150,14 +175,11 @@ template <int W>
         return;
     }
     taps.count = 4;
-    const Floats<W> u = texels(cube.s) - 0.5f, v = texels(cube.t) - 0.5f;
-    const Floats<W> whole_u = floor_small<W>(u), whole_v = floor_small<W>(v);
-    const Ints<W> x = truncate<W>(whole_u), y = truncate<W>(whole_v);
-    const Floats<W> fx = u - whole_u, fy = v - whole_v;
-    const bool crosses = mask_bits<W>((x < 0) | (y < 0) | (x + 1 >= n) | (y + 1 >= n)) != 0;
+    const CubeCorner<W> corner = cube_corner<W>(n, cube);
+    const Floats<W> fx = corner.fx, fy = corner.fy;
     for (int tap = 0; tap < 4; ++tap) {
-        Ints<W> i = x + (tap & 1), j = y + (tap >> 1), face = cube.face;
-        if (crosses) {
+        Ints<W> i = corner.x + (tap & 1), j = corner.y + (tap >> 1), face = cube.face;
+        if (corner.crosses) {
             cross_edges<W>(n, i, j, face, taps.is_corner[tap]);
             taps.has_corner = taps.has_corner || mask_bits<W>(taps.is_corner[tap]) != 0;
         }

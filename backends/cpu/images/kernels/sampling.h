@@ -125,10 +125,41 @@ NACRE_INLINE void footprint(const Sampling<W>& sampling, const Source& source, c
                  {sampler.address_u, sampler.address_v, sampler.address_w}, offset, taps);
 }
 
+/// A linear sample of a cube whose footprint lies on one face in all lanes. False: it does not, and nothing was done.
+template <int W, Codec C>
+[[gnu::noinline]] bool sample_face(const Source& source, const CubeProjection<W>& cube, Ints<W> first_slice, Floats<W>* out) {
+    const CubeCorner<W> corner = cube_corner<W>(source.width, cube);
+    if (corner.crosses) return false;
+    const int channels = raw_channels<C>(*source.plan);
+    const Place<W> place = place_texel<W>(source, corner.x, corner.y, first_slice + cube.face);
+    Floats<W> sum[4] = {};
+    for (int row = 0; row < 2; ++row) {
+        Place<W> first, second;
+        first.offset = place.offset + row * source.row_stride, second.offset = first.offset + 4 * raw_words<C>;
+        Floats<W> texels[2][4];
+        load_two_raw<W, C>(source, first, second, texels);
+        for (int i = 0; i < 2; ++i) {
+            const Floats<W> weight =
+                (i == 0 ? 1.0f - corner.fx : corner.fx) * (row == 0 ? 1.0f - corner.fy : corner.fy);
+            for (int c = 0; c < channels; ++c) sum[c] = sum[c] + weight * texels[i][c];
+        }
+    }
+    for (int c = 0; c < channels; ++c) out[c] = sum[c];
+    finish_raw<W, C>(*source.plan, out);
+    return true;
+}
+
 /// One isotropic sample of one level.
 template <int W>
 [[gnu::noinline]] void sample_once(const Sampling<W>& sampling, const Source& source, const Floats<W>* coordinates,
                                    bool is_linear, Floats<W>* out) {
+    if (sampling.is_cube && is_linear && !sampling.call->has(image_compare)) {
+        bool is_done = false;
+        visit_codec(source.codec, [&]<Codec C>() {
+            if constexpr (raw_words<C> != 0) is_done = sample_face<W, C>(source, sampling.cube, sampling.slice, out);
+        });
+        if (is_done) return;
+    }
     Taps<W> taps;
     footprint<W>(sampling, source, coordinates, is_linear, sampling.offset, taps);
     const rhi::BorderColor border = sampling.sampler->border;
@@ -248,7 +279,7 @@ template <int W, Codec C>
         place.offset = x.first * bytes + y.first * source.row_stride + slice;
         load_raw<W, C>(source, place, out);
     } else {
-        constexpr int channels = C == Codec::word ? 1 : 4;
+        const int channels = raw_channels<C>(plan);
         const AxisTaps<W> x = linear_axis<W>(s, source.width, sampling.u, nullptr);
         const AxisTaps<W> y = linear_axis<W>(t, source.height, sampling.v, nullptr);
         const Ints<W> left = x.first * bytes, right = x.second * bytes;

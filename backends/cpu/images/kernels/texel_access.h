@@ -50,6 +50,45 @@ NACRE_INLINE TexelCoordinates<W> texel_coordinates(const Invocation& call, const
     return at;
 }
 
+/// Lanes whose texels are looked for side by side: all, or eight.
+template <int W>
+inline constexpr int row_lanes = W < 8 ? W : 8;
+template <int W>
+NACRE_INLINE std::uint32_t row_mask(int first) {
+    return ((1u << row_lanes<W>) - 1) << first;
+}
+/// Whether the texels of the lanes from `first` on, of `bytes` bytes each, lie side by side.
+template <int W>
+NACRE_INLINE bool is_row(Ints<W> offset, int first, int bytes) {
+    const Ints<W> behind = offset - offset[first] - (lane_numbers<W>() - first) * bytes;
+    return (mask_bits<W>(behind == 0) & row_mask<W>(first)) == row_mask<W>(first);
+}
+
+/// Texels of N words where those of every eight lanes lie side by side, as compute passes read them: plain loads cost a small
+/// part of gathers. False: they do not, or some lanes are off.
+template <int W, int N>
+NACRE_INLINE bool read_rows(const std::byte* base, Ints<W> offset, std::uint32_t lanes, Ints<W>* words) {
+    if (lanes != all_lanes<W>) return false;
+    for (int first = 0; first < W; first += row_lanes<W>)
+        if (!is_row<W>(offset, first, 4 * N)) return false;
+    Ints<W> texels[N];
+    auto* const packed = reinterpret_cast<std::byte*>(texels);
+    for (int first = 0; first < W; first += row_lanes<W>)
+        __builtin_memcpy(packed + first * 4 * N, base + offset[first], row_lanes<W> * 4 * N);
+    if constexpr (N == 1) {
+        words[0] = texels[0];
+    } else if constexpr (N == 2) {
+        split_pairs<W>(texels[0], texels[1], words[0], words[1]);
+    } else {
+        Ints<W> even[2], odd[2];
+        split_pairs<W>(texels[0], texels[1], even[0], odd[0]);
+        split_pairs<W>(texels[2], texels[3], even[1], odd[1]);
+        split_pairs<W>(even[0], even[1], words[0], words[2]);
+        split_pairs<W>(odd[0], odd[1], words[1], words[3]);
+    }
+    return true;
+}
+
 /// Texels of one level for all lanes; zero outside.
 template <int W>
 NACRE_INLINE void read_level(const Invocation& call, std::uint32_t level, Floats<W>* out) {
@@ -78,20 +117,17 @@ NACRE_INLINE void read_level(const Invocation& call, std::uint32_t level, Floats
             return;
         }
     }
-    if (source.codec == Codec::word) {
-        // Compute passes read rows of texels; a plain load costs a small part of a gather.
-        const std::int32_t first = place.offset[0];
-        Ints<W> word;
-        if (mask_bits<W>((place.offset - first == lane_numbers<W>() * 4) & at.is_inside) == all_lanes<W>) {
-            word = load_ints<W>(source.base + first);
-        } else {
-            word = gather_words<W>(source.base, place.offset) & at.is_inside;
+    bool is_done = false;
+    visit_codec(source.codec, [&]<Codec C>() {
+        if constexpr (raw_words<C> != 0) {
+            Ints<W> words[raw_words<C>];
+            is_done = read_rows<W, raw_words<C>>(source.base, place.offset, mask_bits<W>(at.is_inside), words);
+            if (!is_done) return;
+            decode_raw<W, C>(words, out);
+            finish_raw<W, C>(*source.plan, out);
         }
-        out[0] = (Floats<W>)word;
-        out[1] = out[2] = splat<W>(0.0f);
-        out[3] = (Floats<W>)((source.plan->is_integer ? splat<W>(1) : (Ints<W>)splat<W>(1.0f)) & at.is_inside);
-        return;
-    }
+    });
+    if (is_done) return;
     load_texels<W>(source, place, out);
     for (int c = 0; c < 4; ++c) out[c] = (Floats<W>)((Ints<W>)out[c] & at.is_inside);
 }
@@ -145,12 +181,10 @@ NACRE_INLINE void write_texels(std::byte* base, Ints<W> offset, const Ints<W>* w
     }
     alignas(64) std::byte packed[sizeof texels];
     __builtin_memcpy(packed, texels, sizeof texels);
-    constexpr int run = W < 8 ? W : 8;
-    for (int first = 0; first < W; first += run) {
-        const std::uint32_t lanes = ((1u << run) - 1) << first;
-        const Ints<W> behind = offset - offset[first] - (lane_numbers<W>() - first) * (4 * N);
-        if ((stored & lanes) == lanes && (mask_bits<W>(behind == 0) & lanes) == lanes) {
-            __builtin_memcpy(base + offset[first], packed + first * 4 * N, run * 4 * N);
+    for (int first = 0; first < W; first += row_lanes<W>) {
+        const std::uint32_t lanes = row_mask<W>(first);
+        if ((stored & lanes) == lanes && is_row<W>(offset, first, 4 * N)) {
+            __builtin_memcpy(base + offset[first], packed + first * 4 * N, row_lanes<W> * 4 * N);
             continue;
         }
         for (std::uint32_t rest = stored & lanes; rest != 0; rest &= rest - 1) {

@@ -162,6 +162,8 @@ template <Codec C>
 NACRE_INLINE int raw_channels(const FormatPlan& plan) {
     if constexpr (C == Codec::word)
         return 1;
+    else if constexpr (C == Codec::half2)
+        return 2;
     else if constexpr (C == Codec::general || C == Codec::block_channels)
         return plan.channel_count;
     else if constexpr (C == Codec::shared_exponent)
@@ -172,10 +174,10 @@ NACRE_INLINE int raw_channels(const FormatPlan& plan) {
 
 /// Words of a texel that `decode_raw` takes; 0: the codec has other ways to its texels.
 template <Codec C>
-inline constexpr int raw_words = C == Codec::word || C == Codec::rgba8 || C == Codec::srgb8 ? 1
-                                 : C == Codec::half4                                        ? 2
-                                 : C == Codec::float4                                       ? 4
-                                                                                            : 0;
+inline constexpr int raw_words = C == Codec::word || C == Codec::rgba8 || C == Codec::srgb8 || C == Codec::half2 ? 1
+                                 : C == Codec::half4                                                              ? 2
+                                 : C == Codec::float4                                                             ? 4
+                                                                                                                  : 0;
 
 /// Channels of texels whose words are known, `raw_scale` times too large.
 template <int W, Codec C>
@@ -191,8 +193,8 @@ NACRE_INLINE void decode_raw(const Ints<W>* words, Floats<W>* out) {
             for (int c = 0; c < 3; ++c) out[c] = to_floats<W>((word >> (8 * c)) & 255);
         }
         out[3] = to_floats<W>((Ints<W>)((Uints<W>)word >> 24));
-    } else if constexpr (C == Codec::half4) {
-        for (int pair = 0; pair < 2; ++pair) {
+    } else if constexpr (C == Codec::half2 || C == Codec::half4) {
+        for (int pair = 0; pair < raw_words<C>; ++pair) {
             out[2 * pair] = halves_to_floats<W>(words[pair] & 0xffff);
             out[2 * pair + 1] = halves_to_floats<W>((Ints<W>)((Uints<W>)words[pair] >> 16));
         }
@@ -308,6 +310,7 @@ NACRE_INLINE void visit_codec(Codec codec, Visit visit) {
         case Codec::word: visit.template operator()<Codec::word>(); break;
         case Codec::rgba8: visit.template operator()<Codec::rgba8>(); break;
         case Codec::srgb8: visit.template operator()<Codec::srgb8>(); break;
+        case Codec::half2: visit.template operator()<Codec::half2>(); break;
         case Codec::half4: visit.template operator()<Codec::half4>(); break;
         case Codec::float4: visit.template operator()<Codec::float4>(); break;
         case Codec::general: visit.template operator()<Codec::general>(); break;

@@ -47,8 +47,9 @@ NACRE_INLINE void encode_words(const FormatPlan& plan, const Ints<W>* values, In
         case Codec::float4:
             for (int c = 0; c < 4; ++c) words[c] = values[c];
             return;
+        case Codec::half2:
         case Codec::half4:
-            for (int pair = 0; pair < 2; ++pair)
+            for (int pair = 0; pair < plan.words; ++pair)
                 words[pair] = floats_to_halves<W>((Floats<W>)values[2 * pair]) |
                               floats_to_halves<W>((Floats<W>)values[2 * pair + 1]) << 16;
             return;
