@@ -49,6 +49,13 @@ struct TileRun {
     bool simple_depth = false;                        ///< See Coverage::run_simple_blocks.
     alignas(16) std::int32_t limits[4] = {};  ///< Pixels that may be drawn: first x and y, last x and y with all bits turned.
 
+    // What write_plain writes: words of 16 lanes in FragmentBatch::colors, or of packed texels, and where in a block they go.
+    struct PlainWord {
+        std::uint32_t from, to;
+    };
+    PlainWord plain_words[8 * 4];
+    std::uint32_t plain_from_batch = 0, plain_count = 0;
+
     // The record that is drawn.
     const Record* record = nullptr;
     const std::byte* vertex_memory = nullptr;
@@ -204,6 +211,7 @@ struct TileRun {
     }
 
     void begin_draw(std::uint32_t index) {
+        if (index == draw_index) return;
         flush();
         draw_index = index;
         draw = job.draws[index];
@@ -221,6 +229,7 @@ struct TileRun {
         }
         entered_regions = ~0u;
         for (std::uint32_t i = 0; i < draw->color_count; ++i) entered_regions &= loaded_regions[draw->colors[i].target];
+        if (draw->plain_results) list_plain_words();
         if (depth) note_bounds(plan);
         const auto larger = [](std::int32_t a, std::int32_t b) { return a > b ? a : b; };
         limits[0] = larger(draw->x_begin - tile_x, 0), limits[1] = larger(draw->y_begin - tile_y, 0);
@@ -319,8 +328,8 @@ struct TileRun {
 
     // ---- Fragments -----------------------------------------------------------------------------------------------
 
+    /// @param next  of the draw that has begun
     void begin_record(const Record& next, const std::byte* vertices) {
-        if (next.draw() != draw_index) begin_draw(next.draw());
         record = &next;
         vertex_memory = vertices;
         primitive = nullptr;
@@ -461,38 +470,48 @@ struct TileRun {
 
     /// The frequent case of `resolve`: one sample, tested before, nothing blended.
     void write_plain(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t quads) {
-        const std::uint32_t live = batch.live;
-        struct Words {
-            const std::uint32_t* from;
-            std::uint32_t offset;
-        };
-        Words words[8 * 4];
-        std::uint32_t count = 0;
         alignas(64) std::uint32_t packed[8][4][16];
-        for (std::uint32_t i = 0; i < draw->color_count; ++i) {
-            const ColorPlan& plan = draw->colors[i];
-            const ColorTarget& target = targets.colors[plan.target];
-            const std::uint32_t(*from)[16] = batch.colors[plan.output];
-            if (!plan.as_it_is) {
-                pack_colors(plan, target, *job.srgb, batch, packed[i]);
-                from = packed[i];
-            }
-            const std::uint32_t offset = color_offset(target, 0);
-            for (std::uint32_t word = 0; word < target.words; ++word)
-                words[count++] = {from[word], offset + 16 * word};
-        }
+        if (plain_from_batch != plain_count)
+            for (std::uint32_t i = 0; i < draw->color_count; ++i)
+                if (const ColorPlan& plan = draw->colors[i]; !plan.as_it_is)
+                    pack_colors(plan, targets.colors[plan.target], *job.srgb, batch, packed[i]);
+        const std::uint32_t live = batch.live, from_batch = plain_from_batch, count = plain_count;
+        const std::size_t block_words = targets.color_planes * 16;
+        std::uint32_t* const colors = memory.colors;
+        const PlainWord* const words = plain_words;
+        // What the fragment function has written as it is comes first.
+        const auto each = [&](std::uint32_t place, std::uint32_t lane, auto&& write) {
+            std::uint32_t* const to = colors + (place >> 4) * block_words + (place & 15);
+            std::uint32_t i = 0;
+            for (; i < from_batch; ++i) write(to + words[i].to, &batch.colors[0][0][0] + words[i].from + lane);
+            for (; i < count; ++i) write(to + words[i].to, &packed[0][0][0] + words[i].from + lane);
+        };
         if (quads == 4 && live == 0xffff && is_block(places)) {
-            std::uint32_t* const to = colors_at(places[0]);
-            for (std::uint32_t i = 0; i < count; ++i) store(to + words[i].offset, load(words[i].from));
+            each(places[0], 0, [](std::uint32_t* to, const std::uint32_t* from) { store(to, load(from)); });
             return;
         }
-        alignas(64) std::int32_t keep[16];
-        store(keep, select(lanes_of(live), ints(0), ints(-1)));
-        // Quads of unfilled batches repeat others, without a live pixel.
         for (std::uint32_t quad = 0; quad < quads; ++quad) {
-            std::uint32_t* const to = colors_at(places[quad]);
-            const Int4 kept = load4(keep + 4 * quad);
-            for (std::uint32_t i = 0; i < count; ++i) store_quad(to + words[i].offset, words[i].from + 4 * quad, kept);
+            // Quads of unfilled batches repeat others, without a live pixel.
+            const std::uint32_t pixels = live >> (4 * quad) & 15;
+            each(places[quad], 4 * quad, [&](std::uint32_t* to, const std::uint32_t* from) {
+                store_some4(to, load4(from), pixels);
+            });
+        }
+    }
+    /// Lists the words that write_plain writes.
+    void list_plain_words() {
+        plain_count = plain_from_batch = 0;
+        for (int part = 0; part < 2; ++part) {
+            const bool as_it_is = part == 0;
+            for (std::uint32_t i = 0; i < draw->color_count; ++i) {
+                const ColorPlan& plan = draw->colors[i];
+                if (plan.as_it_is != as_it_is) continue;
+                const ColorTarget& target = targets.colors[plan.target];
+                for (std::uint32_t word = 0; word < target.words; ++word)
+                    plain_words[plain_count++] = {((as_it_is ? plan.output : i) * 4 + word) * 16,
+                                                  color_offset(target, 0) + 16 * word};
+            }
+            if (as_it_is) plain_from_batch = plain_count;
         }
     }
     /// Whether four quads are those of one block, in their order.
@@ -608,12 +627,10 @@ struct TileRun {
                             store4(old[word] + 4 * quad, load4(colors_at(places[quad]) + offset + 16 * word));
                     blend_colors(*draw, plan, target, *job.srgb, batch, old, words);
                 }
-                alignas(64) std::int32_t keep[16];
-                store(keep, select(lanes_of(mask), ints(0), ints(-1)));
                 for (std::uint32_t quad = first_quad; quad < end_quad; ++quad)
                     for (std::uint32_t word = 0; word < target.words; ++word)
-                        store_quad(colors_at(places[quad]) + offset + 16 * word, words[word] + 4 * quad,
-                                   load4(keep + 4 * quad));
+                        store_some4(colors_at(places[quad]) + offset + 16 * word, load4(words[word] + 4 * quad),
+                                    mask >> (4 * quad) & 15);
             };
             if (!reads || !conflict) {
                 write(0, quads);
