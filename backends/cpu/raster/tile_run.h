@@ -359,7 +359,7 @@ struct TileRun {
         if ((entered_regions >> region & 1) == 0) enter_region(region);
         const PrimitiveData* const from = &current_primitive();
         const std::uint32_t first = stream.quads;
-        for (std::uint32_t quad = 0; quad < 4; ++quad) stream.primitives[first + quad] = from;
+        repeat_pointer<4>(stream.primitives + first, from);
         const std::uint32_t used = append_quads(stream, place, live);
         if (covered) {
             std::uint32_t next = first;
@@ -379,10 +379,17 @@ struct TileRun {
             enter_region(static_cast<std::uint32_t>(__builtin_ctz(fresh)));
         Stream& stream = memory.streams[0];
         const PrimitiveData* const from = &current_primitive();
-        for (std::uint32_t quad = 0; quad < 16; ++quad) stream.primitives[stream.quads + quad] = from;
+        repeat_pointer<16>(stream.primitives + stream.quads, from);
         for (std::uint32_t block = 0; block < 4; ++block)
             append_quads(stream, place + four_blocks[block], live[block]);
         if (stream.quads >= stream_quads) flush_stream(0, stream_quads);
+    }
+    template <int count>
+    NACRE_LANES_INLINE static void repeat_pointer(const PrimitiveData** to, const PrimitiveData* from) {
+        using Pointers [[gnu::vector_size(32)]] = std::uint64_t;
+        static_assert(sizeof(from) == 8);
+        const Pointers four = Pointers{} + reinterpret_cast<std::uint64_t>(from);
+        for (int i = 0; i < count; i += 4) std::memcpy(to + i, &four, sizeof(four));
     }
     /// @return the quads that have a pixel, one bit for each
     NACRE_LANES_INLINE static std::uint32_t append_quads(Stream& stream, std::uint32_t place, std::uint32_t live) {
