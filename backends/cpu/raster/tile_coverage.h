@@ -271,7 +271,7 @@ struct Coverage {
         const DrawPlan& draw = *run.draw;
         const std::int32_t region_x = x0 / 16, region_y = y0 / 16;
         if (draw.hierarchical && run.depth && region_x == x1 / 16 && region_y == y1 / 16 &&
-            run.hidden(region_x, region_y, x0, x1, y0, y1))
+            run.hidden(region_x, region_y, x0, x1, y0, y1, true))
             return;
         bounded = (from.cut >> lane & 1) != 0;
         const std::int32_t left = x0 / 4, right = x1 / 4, top = y0 / 4, bottom = y1 / 4;
@@ -357,7 +357,7 @@ struct Coverage {
         const bool rejects = run.draw->hierarchical && run.depth;
         const std::int32_t region_x = x0 / 16, region_y = y0 / 16;
         if (region_x == x1 / 16 && region_y == y1 / 16) {
-            if (rejects && run.hidden(region_x, region_y, x0, x1, y0, y1)) return;
+            if (rejects && run.hidden(region_x, region_y, x0, x1, y0, y1, false)) return;
             run_blocks(edges, first_x, last_x, first_y, last_y);
             return;
         }
@@ -382,7 +382,7 @@ struct Coverage {
                     for (std::uint32_t s = 0; s < samples; ++s) part.e[s][part.edges] = e[s][i];
                     ++part.edges;
                 }
-                if (outside || (rejects && run.hidden(x, y, left, right, top, bottom))) continue;
+                if (outside || (rejects && run.hidden(x, y, left, right, top, bottom, false))) continue;
                 part.bounded = bounded || part.edges < edges;
                 part.run_blocks(part.edges, left / 4, right / 4, top / 4, bottom / 4);
             }

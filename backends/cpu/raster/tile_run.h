@@ -46,6 +46,7 @@ struct TileRun {
     std::int32_t* depth = nullptr;  ///< Where the draw tests depth.
     std::int32_t* stencil = nullptr;
     float depth_low = 0.0f, depth_high = 1.0f;
+    std::int32_t farthest_key = 0;  ///< Of the depths from 0 to 1.
     bool simple_depth = false;                        ///< See Coverage::run_simple_blocks.
     alignas(16) std::int32_t limits[4] = {};  ///< Pixels that may be drawn: first x and y, last x and y with all bits turned.
 
@@ -238,6 +239,7 @@ struct TileRun {
         simple_depth = targets.samples == 1 && !draw->late_tests && !stencil;
         depth_low = plan.clamps && plan.clamp_low > 0.0f ? plan.clamp_low : 0.0f;
         depth_high = plan.clamps ? plan.clamp_high : 1.0f;
+        farthest_key = depth_key(targets.depth_layout, 1.0f, 0.0f, 1.0f);
     }
 
     // ---- Depth ---------------------------------------------------------------------------------------------------
@@ -303,14 +305,25 @@ struct TileRun {
     /// Whether no sample of the record in pixels [x0, x1] x [y0, y1] of the tile, all in one region, passes the depth
     /// test. Floating-point addition and multiplication keep order, so the formula of depth is largest and smallest in
     /// the corners, bit for bit.
-    bool hidden(std::int32_t region_x, std::int32_t region_y, std::int32_t x0, std::int32_t x1, std::int32_t y0,
-                std::int32_t y1) {
+    /// @param is_small  one of many triangles in the region: it is not measured for each of them
+    [[gnu::always_inline]] bool hidden(std::int32_t region_x, std::int32_t region_y, std::int32_t x0, std::int32_t x1,
+                                       std::int32_t y0, std::int32_t y1, bool is_small) {
         const std::int32_t region = region_y * regions_across + region_x;
-        std::uint64_t rows;
-        std::memcpy(&rows, written_blocks + region_y * region_blocks, sizeof(rows));
-        const int blocks = __builtin_popcountll(rows & 0x000f000f000f000full << (4 * region_x));
-        // Measured when all of it is new, or when something is and it is asked about often.
-        if (blocks == 16 || (blocks != 0 && ++region_doubts[region] == 64)) measure_region(region_x, region_y);
+        const std::uint32_t doubts = ++region_doubts[region];
+        if (!is_small || doubts % 32 == 0) {
+            std::uint64_t rows;
+            std::memcpy(&rows, written_blocks + region_y * region_blocks, sizeof(rows));
+            const int blocks = __builtin_popcountll(rows & 0x000f000f000f000full << (4 * region_x));
+            // When all of it is new, or when something is and it is asked about often.
+            if (blocks == 16 || (blocks != 0 && doubts % 32 == 0)) measure_region(region_x, region_y);
+        }
+        // Nothing lies before the nearest depth that there is, or behind the farthest.
+        const std::int32_t bound_key = region_bounds[region];
+        if (bound == Bound::above ? bound_key >= farthest_key : bound_key <= 0) return false;
+        return hidden(bound_key, x0, x1, y0, y1);
+    }
+    [[gnu::noinline]] bool hidden(std::int32_t bound_key, std::int32_t x0, std::int32_t x1, std::int32_t y0,
+                                  std::int32_t y1) const {
         const rhi::CompareOperation operation = draw->depth_stencil.compare;
         const bool nearer = keeps_nearer(operation);
         const float inset = targets.samples == 1 ? 0.5f : 0.125f;
@@ -319,10 +332,10 @@ struct TileRun {
         const float y = static_cast<float>(tile_y + (lower ? y1 : y0)) + (lower ? 1.0f - inset : inset);
         const std::int32_t key = depth_key(targets.depth_layout, depth_at(x, y), depth_low, depth_high);
         switch (operation) {
-            case rhi::CompareOperation::less: return key >= region_bounds[region];
-            case rhi::CompareOperation::less_or_equal: return key > region_bounds[region];
-            case rhi::CompareOperation::greater: return key <= region_bounds[region];
-            default: return key < region_bounds[region];
+            case rhi::CompareOperation::less: return key >= bound_key;
+            case rhi::CompareOperation::less_or_equal: return key > bound_key;
+            case rhi::CompareOperation::greater: return key <= bound_key;
+            default: return key < bound_key;
         }
     }
 
