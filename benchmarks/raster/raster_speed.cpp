@@ -95,8 +95,8 @@ void fragment_function(const cpu::ShaderContext*, cpu::FragmentBatch* batches, s
                                                    batch.primitives[3]};
         alignas(64) float places[2][16];
         for (int lane = 0; lane < 16; ++lane) {
-            places[0][lane] = static_cast<float>(batch.x[lane / 4] + (lane & 1)) + 0.5f - from[lane / 4]->x0;
-            places[1][lane] = static_cast<float>(batch.y[lane / 4] + (lane >> 1 & 1)) + 0.5f - from[lane / 4]->y0;
+            places[0][lane] = static_cast<float>(batch.x[lane / 4] + (lane & 1)) + 0.5f - from[lane / 4]->origin_x;
+            places[1][lane] = static_cast<float>(batch.y[lane / 4] + (lane >> 1 & 1)) + 0.5f - from[lane / 4]->origin_y;
         }
         Floats x, y;
         std::memcpy(&x, places[0], sizeof(x)), std::memcpy(&y, places[1], sizeof(y));

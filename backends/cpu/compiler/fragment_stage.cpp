@@ -27,6 +27,13 @@ Component FragmentEmitter::primitive_word(std::size_t offset, llvm::Type* type) 
     const std::size_t aligned = offset / 16 * 16;
     const int part = static_cast<int>(offset % 16 / 4);
     auto* four = llvm::FixedVectorType::get(builder.getFloatTy(), 4);
+    llvm::SmallVector<int, 16> spread(lanes);
+    for (std::uint32_t i = 0; i < lanes; ++i) spread[i] = static_cast<int>(i / 4 * 4) + part;
+    const auto finished = [&](llvm::Value* joined) {
+        llvm::Value* value = builder.CreateShuffleVector(joined, spread);
+        return Component(type->isFloatTy() ? value : builder.CreateBitCast(value, vector_of(type)));
+    };
+    if (const auto found = joined_words_.find(aligned); found != joined_words_.end()) return finished(found->second);
     std::vector<llvm::Value*> parts;
     for (std::uint32_t q = 0; q < quads; ++q)
         parts.push_back(invariant_load(four, at_offset(primitives[q], static_cast<std::int64_t>(aligned)), 16));
@@ -41,10 +48,8 @@ Component FragmentEmitter::primitive_word(std::size_t offset, llvm::Type* type) 
         }
         parts = std::move(joined);
     }
-    llvm::SmallVector<int, 16> spread(lanes);
-    for (std::uint32_t i = 0; i < lanes; ++i) spread[i] = static_cast<int>(i / 4 * 4) + part;
-    llvm::Value* value = builder.CreateShuffleVector(parts[0], spread);
-    return Component(type->isFloatTy() ? value : builder.CreateBitCast(value, vector_of(type)));
+    if (keeps_joined_words) joined_words_.emplace(aligned, parts[0]);
+    return finished(parts[0]);
 }
 
 Component FragmentEmitter::evaluate_plane(std::size_t offset, const Place& place) {
@@ -98,8 +103,10 @@ std::vector<llvm::Value*> FragmentEmitter::for_one_or_several(const std::functio
     const auto fill = [&](llvm::BasicBlock*& block, bool of_one) {
         builder.SetInsertPoint(block);
         is_one_primitive = of_one;
+        keeps_joined_words = !of_one;
         std::vector<llvm::Value*> values = evaluate();
-        is_one_primitive = false;
+        is_one_primitive = keeps_joined_words = false;
+        joined_words_.clear();
         block = builder.GetInsertBlock();
         builder.CreateBr(next);
         return values;

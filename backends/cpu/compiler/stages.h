@@ -80,6 +80,9 @@ class FragmentEmitter final : public Emitter {
     bool is_one_primitive = false;  ///< While code is emitted for batches whose quads all have the first one's primitive.
     llvm::Value *pixel_x = nullptr, *pixel_y = nullptr;  ///< Float, left upper corner of each lane's pixel.
     Place center, centroid;
+    /// Four words of each quad's primitive, by their offset, while `keeps_joined_words`: in code without branches.
+    std::unordered_map<std::size_t, llvm::Value*> joined_words_;
+    bool keeps_joined_words = false;
     std::unordered_map<Id, std::vector<std::uint32_t>> input_numbers_;  ///< For each scalar of an input variable.
     std::vector<InterfaceScalar> input_scalars_;  ///< For each of program.inputs.
     std::vector<llvm::Value*> inputs_;            ///< Their values, and behind them gl_FragCoord.z and .w.

@@ -199,15 +199,22 @@ void Assembler::add(const Corners& corners, const Source& source, std::uint32_t 
 
 void Assembler::triangles(const Segment& segment, const Kernels& kernels) {
     const bool is_strip = pipeline_.topology == rhi::Topology::triangle_strip;
-    const std::vector<std::uint32_t>& locals = scratch_.locals;
-    const auto corner = [&](std::uint32_t number, std::uint32_t which) {
-        if (!is_strip) return locals[3 * std::size_t{number} + which];
-        const std::uint32_t odd = (segment.first_primitive + number) & 1;
-        return locals[number + (which == 0 ? 0 : which == 1 ? 1 + odd : 2 - odd)];
+    if (is_strip) {
+        // As a list.
+        scratch_.list.clear();
+        for (std::uint32_t i = 0; i < segment.primitive_count; ++i) {
+            const std::uint32_t odd = (segment.first_primitive + i) & 1;
+            for (const std::uint32_t place : {i, i + 1 + odd, i + 2 - odd})
+                scratch_.list.push_back(scratch_.locals[place]);
+        }
+    }
+    const std::uint32_t* const corners = is_strip ? scratch_.list.data() : scratch_.locals.data();
+    const auto draw_alone = [&](std::uint32_t number) {
+        const std::uint32_t* const own = corners + 3 * std::size_t{number};
+        triangle(own[0], own[1], own[2], segment.first_primitive + number);
     };
     if (targets_.samples > 1 || pipeline_.fill != rhi::FillMode::fill) {
-        for (std::uint32_t i = 0; i < segment.primitive_count; ++i)
-            triangle(corner(i, 0), corner(i, 1), corner(i, 2), segment.first_primitive + i);
+        for (std::uint32_t i = 0; i < segment.primitive_count; ++i) draw_alone(i);
         return;
     }
     const DrawPlan& plan = draw_.plan;
@@ -222,16 +229,14 @@ void Assembler::triangles(const Segment& segment, const Kernels& kernels) {
     work.draw_bits = draw_bits_;
     for (std::uint32_t first = 0; first < segment.primitive_count; first += 16) {
         work.count = std::min(segment.primitive_count - first, 16u);
-        for (std::uint32_t i = 0; i < 16; ++i)
-            for (std::uint32_t which = 0; which < 3; ++which)
-                work.locals[which][i] = corner(first + std::min(i, work.count - 1), which);
+        work.corners = corners + 3 * std::size_t{first};
         work.screen = chunk_.vertices.data();
         work.first_primitive = segment.first_primitive + first;
         kernels.set_up_triangles(work);
         for (std::uint32_t rest = work.drawn | work.special; rest != 0; rest &= rest - 1) {
             const auto i = static_cast<std::uint32_t>(std::countr_zero(rest));
             if (work.special >> i & 1) {
-                triangle(work.locals[0][i], work.locals[1][i], work.locals[2][i], work.first_primitive + i);
+                draw_alone(first + i);
                 continue;
             }
             const auto index = static_cast<std::uint32_t>(chunk_.records.size());

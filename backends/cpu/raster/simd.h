@@ -317,6 +317,15 @@ NACRE_LANES_INLINE Int4 load4(const void* from) {
     return result;
 }
 NACRE_LANES_INLINE void store4(void* to, Int4 value) { std::memcpy(to, &value, sizeof(value)); }
+/// Writes the lanes whose bit is set.
+NACRE_LANES_INLINE void store_some4(void* to, Int4 value, std::uint32_t mask) {
+#if defined(__AVX512VL__)
+    _mm_mask_storeu_epi32(to, static_cast<__mmask8>(mask), (__m128i)value);
+#else
+    const Int4 kept = ((static_cast<std::int32_t>(mask) & Int4{1, 2, 4, 8}) == 0), old = load4(to);
+    store4(to, value ^ ((value ^ old) & kept));
+#endif
+}
 /// Past the caches, which need not read the rest of the line then; seen by others after `end_streams`. Aligned to 16 bytes.
 NACRE_LANES_INLINE void stream4(void* to, Int4 value) {
 #if defined(__x86_64__)

@@ -9,7 +9,8 @@
 /// Edge functions are exact: E(x, y) = A * (x - x0) + B * (y - y0) in 64 bits with 8 subpixel bits on each side, less
 /// one for edges whose own pixels belong to the neighbor (top-left rule). Samples lie a whole number of pixels apart,
 /// so that the low 8 bits of E, which are the same in all of them, can be cut off (rounding down keeps the sign), and
-/// the rest fits 32 bits wherever the edge crosses the tile.
+/// the rest fits 32 bits wherever the edge crosses the tile. Small triangles, which are at most 32 pixels long both ways,
+/// need no more than 32 bits for all of it.
 
 namespace nacre::cpu::raster {
 namespace {
@@ -32,6 +33,64 @@ NACRE_LANES_INLINE std::uint32_t lanes_inside(std::int32_t block_x, std::int32_t
     if (bottom < 3) lanes &= lanes_to_y[bottom];
     return lanes;
 }
+
+/// What sixteen records of a draw are in a tile, if they are triangles: bounds, edges, and whether they are small enough
+/// for 32 bits to hold all of that.
+struct SmallTriangles {
+    alignas(64) std::int32_t first_x[16], first_y[16], last_x[16], last_y[16];  ///< Pixels of the tile that may be drawn.
+    /// Edge functions: what they change by from pixel to pixel, and their values in the first pixel of the tile and of the
+    /// block that holds (first_x, first_y).
+    alignas(64) std::int32_t along_x[3][16], along_y[3][16], at_tile[3][16], at_block[3][16];
+    std::uint32_t small;  ///< One bit for each record. What is said of the others does not hold.
+    std::uint32_t drawn;  ///< They have pixels that may be drawn.
+    std::uint32_t cut;    ///< Those are not all that they have.
+
+    void prepare(const TileRun& run, const Record* const* records, std::uint32_t count) {
+        alignas(64) std::int32_t words[8][16];
+        for (std::uint32_t lane = 0; lane < 16; lane += 4)
+            for (int row = 0; row < 2; ++row) {
+                Int4 lines[4];
+                for (std::uint32_t i = 0; i < 4; ++i)
+                    lines[i] = load4(reinterpret_cast<const std::byte*>(records[lane + i < count ? lane + i : 0]) + 16 * row);
+                transpose(lines[0], lines[1], lines[2], lines[3]);
+                for (int i = 0; i < 4; ++i) store4(words[4 * row + i] + lane, lines[i]);
+            }
+        static_assert(offsetof(Record, x) == 0 && offsetof(Record, y) == 12);
+        // From the center of the tile's first pixel.
+        Ints x[3], y[3];
+        for (int i = 0; i < 3; ++i) {
+            x[i] = load(words[i]) - ints(run.tile_x * subpixels + subpixels / 2);
+            y[i] = load(words[3 + i]) - ints(run.tile_y * subpixels + subpixels / 2);
+        }
+        const auto bounds = [&](const Ints (&at)[3], std::int32_t begin, std::int32_t turned_last, Ints& low, Ints& high,
+                                Lanes& is_small, Lanes& is_whole) {
+            const Ints first = shift_right_signed<subpixel_bits>(minimum(minimum(at[0], at[1]), at[2]) +
+                                                                 ints(subpixels - 1));
+            const Ints last = shift_right_signed<subpixel_bits>(maximum(maximum(at[0], at[1]), at[2]));
+            is_small = less(last - first, ints(32));
+            low = maximum(first, ints(begin)), high = minimum(last, ints(~turned_last));
+            is_whole = equal(first, low) & equal(last, high);
+        };
+        Ints low_x, high_x, low_y, high_y;
+        Lanes small_x, small_y, whole_x, whole_y;
+        bounds(x, run.limits[0], run.limits[2], low_x, high_x, small_x, whole_x);
+        bounds(y, run.limits[1], run.limits[3], low_y, high_y, small_y, whole_y);
+        small = mask_of(small_x & small_y);
+        cut = mask_of(~(whole_x & whole_y));
+        drawn = mask_of(~(less(high_x, low_x) | less(high_y, low_y)));
+        store(first_x, low_x), store(last_x, high_x), store(first_y, low_y), store(last_y, high_y);
+        const Ints block_x = low_x & ints(~3), block_y = low_y & ints(~3);
+        for (int i = 0; i < 3; ++i) {
+            const int next = i == 2 ? 0 : i + 1;
+            const Ints edge_a = y[i] - y[next], edge_b = x[next] - x[i];
+            const Lanes owns_border = less(ints(0), edge_a) | (equal(edge_a, ints(0)) & less(ints(0), edge_b));
+            const Ints value = shift_right_signed<subpixel_bits>(select(owns_border, ints(0), ints(-1)) - edge_a * x[i] -
+                                                                 edge_b * y[i]);
+            store(along_x[i], edge_a), store(along_y[i], edge_b), store(at_tile[i], value);
+            store(at_block[i], value + edge_a * block_x + edge_b * block_y);
+        }
+    }
+};
 
 template <bool multisampled>
 struct Coverage {
@@ -206,67 +265,38 @@ struct Coverage {
         }
     }
 
-    /// Small triangles with one sample: 32 bits are enough for their edges, and nothing is asked about them that a few
-    /// blocks would not answer as fast.
-    /// @return whether it was one
-    [[gnu::always_inline]] bool draw_small() {
-        const Record& record = *run.record;
-        // The fourth lanes hold something else.
-        const Int4 all_x = load4(record.x), all_y = load4(record.y);
-        const Int4 x = __builtin_shufflevector(all_x, all_x, 0, 1, 2, 0) - (run.tile_x * subpixels + subpixels / 2);
-        const Int4 y = __builtin_shufflevector(all_y, all_y, 0, 1, 2, 0) - (run.tile_y * subpixels + subpixels / 2);
-        const auto lesser = [](Int4 one, Int4 other) { return one < other ? one : other; };
-        const auto greater = [](Int4 one, Int4 other) { return one > other ? one : other; };
-        const auto turned = [](Int4 all) { return __builtin_shufflevector(all, all, 1, 2, 0, 1); };
-        // First x and y and, with all bits turned, last x and y: the least of each. Pixels with a center in between.
-        const Int4 corners = __builtin_shufflevector(x, y, 0, 4, 1, 5), turn = {0, 0, -1, -1};
-        const Int4 corner0 = __builtin_shufflevector(corners, corners, 0, 1, 0, 1) ^ turn;
-        const Int4 corner1 = __builtin_shufflevector(corners, corners, 2, 3, 2, 3) ^ turn;
-        const Int4 corner2 = __builtin_shufflevector(x, y, 2, 6, 2, 6) ^ turn;
-        const Int4 bounds =
-            (lesser(lesser(corner0, corner1), corner2) + Int4{subpixels - 1, subpixels - 1, 0, 0}) >> subpixel_bits;
-        if (~bounds[2] - bounds[0] > 31 || ~bounds[3] - bounds[1] > 31) return false;
-        const Int4 cut = greater(bounds, load4(run.limits));
-        x0 = cut[0], y0 = cut[1], x1 = ~cut[2], y1 = ~cut[3];
-        if (x0 > x1 || y0 > y1) return true;
-        const auto changes = (Long2)(cut ^ bounds);
-        bounded = (changes[0] | changes[1]) != 0;
+    /// Small triangles with one sample: nothing is asked about them that a few blocks would not answer as fast.
+    [[gnu::always_inline]] void draw_small(const SmallTriangles& from, std::uint32_t lane) {
+        x0 = from.first_x[lane], x1 = from.last_x[lane], y0 = from.first_y[lane], y1 = from.last_y[lane];
         const DrawPlan& draw = *run.draw;
         const std::int32_t region_x = x0 / 16, region_y = y0 / 16;
         if (draw.hierarchical && run.depth && region_x == x1 / 16 && region_y == y1 / 16 &&
-            run.hidden(region_x, region_y, x0, x1, y0, y1))
-            return true;
-
-        const Int4 next_x = turned(x), next_y = turned(y);
-        const Int4 edge_a = y - next_y, edge_b = next_x - x;
-        const Int4 owns_border = (edge_a > 0) | ((edge_a == 0) & (edge_b > 0));
-        const Int4 value = (-1 - owns_border - edge_a * x - edge_b * y) >> subpixel_bits;
-        const std::int32_t first_x = x0 / 4, last_x = x1 / 4, first_y = y0 / 4, last_y = y1 / 4;
-        if (run.simple_depth && run.depth && !bounded && last_x - first_x <= 1 && last_y - first_y <= 1) {
-            run_four_blocks(edge_a, edge_b, value, first_x, last_x, first_y, last_y);
-            return true;
+            run.hidden(region_x, region_y, x0, x1, y0, y1, true))
+            return;
+        bounded = (from.cut >> lane & 1) != 0;
+        const std::int32_t left = x0 / 4, right = x1 / 4, top = y0 / 4, bottom = y1 / 4;
+        if (run.simple_depth && run.depth && !bounded && right - left <= 1 && bottom - top <= 1) {
+            run_four_blocks(from, lane, left, right, top, bottom);
+            return;
         }
-        store4(a, edge_a), store4(b, edge_b), store4(e[0], value);
-        run_blocks<3>(first_x, last_x, first_y, last_y);
-        return true;
+        for (int i = 0; i < 3; ++i)
+            a[i] = from.along_x[i][lane], b[i] = from.along_y[i][lane], e[0][i] = from.at_tile[i][lane];
+        run_blocks<3>(left, right, top, bottom);
     }
 
     /// As run_simple_blocks, for two by two blocks and with a depth test: without loops, and with hardly a branch that the
     /// processor could guess wrong. Where there is only one row or column, what is done for the other changes nothing;
     /// the memory of depth goes on behind that of the first sample.
-    [[gnu::always_inline]] void run_four_blocks(Int4 edge_a, Int4 edge_b, Int4 value, std::int32_t first_x,
+    [[gnu::always_inline]] void run_four_blocks(const SmallTriangles& from, std::uint32_t lane, std::int32_t first_x,
                                                 std::int32_t last_x, std::int32_t first_y, std::int32_t last_y) {
         const Record& record = *run.record;
         const DrawPlan& draw = *run.draw;
-        alignas(16) std::int32_t along_x[4], along_y[4], right[4], down[4], origin[4];
-        store4(along_x, edge_a), store4(along_y, edge_b), store4(right, edge_a * 4), store4(down, edge_b * 4);
-        store4(origin, value + edge_a * (4 * first_x) + edge_b * (4 * first_y));
         Ints edges_at[4];
         for (int i = 0; i < 3; ++i) {
-            const Ints first =
-                ints(along_x[i]) * load(lane_x) + ints(along_y[i]) * load(lane_y) + ints(origin[i]);
-            const Ints second = first + ints(right[i]);
-            const Ints third = first + ints(down[i]), fourth = second + ints(down[i]);
+            const Ints along_x = ints(from.along_x[i][lane]), along_y = ints(from.along_y[i][lane]);
+            const Ints first = along_x * load(lane_x) + along_y * load(lane_y) + ints(from.at_block[i][lane]);
+            const Ints down = shift_left<2>(along_y);
+            const Ints second = first + shift_left<2>(along_x), third = first + down, fourth = second + down;
             edges_at[0] = i == 0 ? first : edges_at[0] | first;
             edges_at[1] = i == 0 ? second : edges_at[1] | second;
             edges_at[2] = i == 0 ? third : edges_at[2] | third;
@@ -322,14 +352,12 @@ struct Coverage {
     }
 
     void draw_triangle() {
-        if constexpr (!multisampled)
-            if (draw_small()) return;
         if (!set_up()) return;
         const std::int32_t first_x = x0 / 4, last_x = x1 / 4, first_y = y0 / 4, last_y = y1 / 4;
         const bool rejects = run.draw->hierarchical && run.depth;
         const std::int32_t region_x = x0 / 16, region_y = y0 / 16;
         if (region_x == x1 / 16 && region_y == y1 / 16) {
-            if (rejects && run.hidden(region_x, region_y, x0, x1, y0, y1)) return;
+            if (rejects && run.hidden(region_x, region_y, x0, x1, y0, y1, false)) return;
             run_blocks(edges, first_x, last_x, first_y, last_y);
             return;
         }
@@ -354,7 +382,7 @@ struct Coverage {
                     for (std::uint32_t s = 0; s < samples; ++s) part.e[s][part.edges] = e[s][i];
                     ++part.edges;
                 }
-                if (outside || (rejects && run.hidden(x, y, left, right, top, bottom))) continue;
+                if (outside || (rejects && run.hidden(x, y, left, right, top, bottom, false))) continue;
                 part.bounded = bounded || part.edges < edges;
                 part.run_blocks(part.edges, left / 4, right / 4, top / 4, bottom / 4);
             }

@@ -248,8 +248,8 @@ struct TriangleSetup {
     double bias_unit;         ///< What `bias` counts; 0: that of the depth itself, which is a float.
     std::uint32_t draw_bits;  ///< Record::bits of the draw.
     std::uint32_t first_primitive;
-    std::uint32_t count;
-    std::uint32_t locals[3][16];  ///< Corners, into `vertices`; valid in all sixteen.
+    std::uint32_t count;           ///< At least one.
+    const std::uint32_t* corners;  ///< Three for each, into `vertices`.
 
     // Results, one bit for each triangle.
     std::uint32_t drawn;    ///< Its record and tiles are made.

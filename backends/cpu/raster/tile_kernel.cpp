@@ -8,12 +8,15 @@
 namespace nacre::cpu::raster {
 namespace {
 
-void draw_record(TileRun& run, const Record& record, const std::byte* vertices) {
+void draw_record(TileRun& run, const Record& record, const std::byte* vertices, const SmallTriangles& small,
+                 std::uint32_t lane) {
     run.begin_record(record, vertices);
     if (record.bits & Record::thin_line) {
         ThinLine{Coverage<false>(run)}.draw();
     } else if (run.targets.samples > 1) {
         Coverage<true>(run).draw_triangle();
+    } else if (small.small >> lane & 1) {
+        if (small.drawn >> lane & 1) Coverage<false>(run).draw_small(small, lane);
     } else {
         Coverage<false>(run).draw_triangle();
     }
@@ -32,12 +35,22 @@ struct Queue {
         if (++count == capacity) drain(run);
     }
     void drain(TileRun& run) {
-        for (std::uint32_t i = 0; i < count; ++i) {
-            if (i + ahead < count && run.draw && run.draw->shades)
-                for (int corner = 0; corner < 3; ++corner)
-                    __builtin_prefetch(vertices[i + ahead] +
-                                       static_cast<std::size_t>(records[i + ahead]->vertex[corner]) * 16);
-            draw_record(run, *records[i], vertices[i]);
+        SmallTriangles small;
+        for (std::uint32_t first = 0; first < count;) {
+            // Up to sixteen of a draw.
+            const std::uint32_t draw = records[first]->draw();
+            std::uint32_t end = first + 1;
+            while (end < count && end < first + 16 && records[end]->draw() == draw) ++end;
+            run.begin_draw(draw);
+            if (run.targets.samples == 1) small.prepare(run, records + first, end - first);
+            for (std::uint32_t i = first; i < end; ++i) {
+                if (i + ahead < count && run.draw->shades)
+                    for (int corner = 0; corner < 3; ++corner)
+                        __builtin_prefetch(vertices[i + ahead] +
+                                           static_cast<std::size_t>(records[i + ahead]->vertex[corner]) * 16);
+                draw_record(run, *records[i], vertices[i], small, i - first);
+            }
+            first = end;
         }
         count = 0;
     }

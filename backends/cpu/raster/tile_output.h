@@ -10,14 +10,6 @@
 namespace nacre::cpu::raster {
 namespace {
 
-/// Writes pixels of a quad; those that do not count are written back as they were: no other thread touches the tile, and
-/// a branch for each of them would cost more.
-/// @param keep  all bits in pixels that do not count
-NACRE_LANES_INLINE void store_quad(std::uint32_t* to, const std::uint32_t* from, Int4 keep) {
-    const Int4 old = load4(to), fresh = load4(from);
-    store4(to, fresh ^ ((fresh ^ old) & keep));
-}
-
 /// What blend factors are made of.
 struct BlendInputs {
     Floats source[4], source1[4], destination[4], constant[4];

@@ -122,18 +122,19 @@ inline void store_pixels(std::byte* to, std::uint32_t row_stride, const TileArea
         std::byte* const line = to + static_cast<std::size_t>(y) * row_stride;
         const std::int32_t* const blocks = area.blocks + static_cast<std::size_t>(y / 4) * area.row_words;
         const std::int32_t whole = area.height - y < 4 ? 0 : area.width / 4;
-        // Row by row, so that lines of the cache are written as a whole.
-        for (int row = 0; row < 4; ++row) {
-            std::byte* texels = line + static_cast<std::size_t>(row) * row_stride;
-            const std::int32_t* block = blocks + 8 * (row / 2) + 2 * (row & 1);
+        // Row by row, two at once, so that lines of the cache are written as a whole.
+        for (int pair = 0; pair < 2; ++pair) {
+            std::byte* texels = line + static_cast<std::size_t>(2 * pair) * row_stride;
+            const std::int32_t* block = blocks + 8 * pair;
             for (std::int32_t x = 0; x < whole; ++x, texels += 4 * bytes, block += area.block_words) {
-                Int4 all[words];
+                Int4 top[words], bottom[words];
                 for (int word = 0; word < words; ++word) {
-                    std::int64_t halves[2];
-                    std::memcpy(halves, block + 16 * word, 8), std::memcpy(halves + 1, block + 16 * word + 4, 8);
-                    std::memcpy(all + word, halves, 16);
+                    const Int4 left = load4(block + 16 * word), right = load4(block + 16 * word + 4);
+                    top[word] = __builtin_shufflevector(left, right, 0, 1, 4, 5);
+                    bottom[word] = __builtin_shufflevector(left, right, 2, 3, 6, 7);
                 }
-                store_row<bytes, streams>(texels, all);
+                store_row<bytes, streams>(texels, top);
+                store_row<bytes, streams>(texels + row_stride, bottom);
             }
         }
         for (std::int32_t x = 4 * whole; x < area.width; x += 4)

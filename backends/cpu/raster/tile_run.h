@@ -46,8 +46,16 @@ struct TileRun {
     std::int32_t* depth = nullptr;  ///< Where the draw tests depth.
     std::int32_t* stencil = nullptr;
     float depth_low = 0.0f, depth_high = 1.0f;
+    std::int32_t farthest_key = 0;  ///< Of the depths from 0 to 1.
     bool simple_depth = false;                        ///< See Coverage::run_simple_blocks.
     alignas(16) std::int32_t limits[4] = {};  ///< Pixels that may be drawn: first x and y, last x and y with all bits turned.
+
+    // What write_plain writes: words of 16 lanes in FragmentBatch::colors, or of packed texels, and where in a block they go.
+    struct PlainWord {
+        std::uint32_t from, to;
+    };
+    PlainWord plain_words[8 * 4];
+    std::uint32_t plain_from_batch = 0, plain_count = 0;
 
     // The record that is drawn.
     const Record* record = nullptr;
@@ -204,6 +212,7 @@ struct TileRun {
     }
 
     void begin_draw(std::uint32_t index) {
+        if (index == draw_index) return;
         flush();
         draw_index = index;
         draw = job.draws[index];
@@ -221,6 +230,7 @@ struct TileRun {
         }
         entered_regions = ~0u;
         for (std::uint32_t i = 0; i < draw->color_count; ++i) entered_regions &= loaded_regions[draw->colors[i].target];
+        if (draw->plain_results) list_plain_words();
         if (depth) note_bounds(plan);
         const auto larger = [](std::int32_t a, std::int32_t b) { return a > b ? a : b; };
         limits[0] = larger(draw->x_begin - tile_x, 0), limits[1] = larger(draw->y_begin - tile_y, 0);
@@ -229,6 +239,7 @@ struct TileRun {
         simple_depth = targets.samples == 1 && !draw->late_tests && !stencil;
         depth_low = plan.clamps && plan.clamp_low > 0.0f ? plan.clamp_low : 0.0f;
         depth_high = plan.clamps ? plan.clamp_high : 1.0f;
+        farthest_key = depth_key(targets.depth_layout, 1.0f, 0.0f, 1.0f);
     }
 
     // ---- Depth ---------------------------------------------------------------------------------------------------
@@ -294,14 +305,25 @@ struct TileRun {
     /// Whether no sample of the record in pixels [x0, x1] x [y0, y1] of the tile, all in one region, passes the depth
     /// test. Floating-point addition and multiplication keep order, so the formula of depth is largest and smallest in
     /// the corners, bit for bit.
-    bool hidden(std::int32_t region_x, std::int32_t region_y, std::int32_t x0, std::int32_t x1, std::int32_t y0,
-                std::int32_t y1) {
+    /// @param is_small  one of many triangles in the region: it is not measured for each of them
+    [[gnu::always_inline]] bool hidden(std::int32_t region_x, std::int32_t region_y, std::int32_t x0, std::int32_t x1,
+                                       std::int32_t y0, std::int32_t y1, bool is_small) {
         const std::int32_t region = region_y * regions_across + region_x;
-        std::uint64_t rows;
-        std::memcpy(&rows, written_blocks + region_y * region_blocks, sizeof(rows));
-        const int blocks = __builtin_popcountll(rows & 0x000f000f000f000full << (4 * region_x));
-        // Measured when all of it is new, or when something is and it is asked about often.
-        if (blocks == 16 || (blocks != 0 && ++region_doubts[region] == 64)) measure_region(region_x, region_y);
+        const std::uint32_t doubts = ++region_doubts[region];
+        if (!is_small || doubts % 32 == 0) {
+            std::uint64_t rows;
+            std::memcpy(&rows, written_blocks + region_y * region_blocks, sizeof(rows));
+            const int blocks = __builtin_popcountll(rows & 0x000f000f000f000full << (4 * region_x));
+            // When all of it is new, or when something is and it is asked about often.
+            if (blocks == 16 || (blocks != 0 && doubts % 32 == 0)) measure_region(region_x, region_y);
+        }
+        // Nothing lies before the nearest depth that there is, or behind the farthest.
+        const std::int32_t bound_key = region_bounds[region];
+        if (bound == Bound::above ? bound_key >= farthest_key : bound_key <= 0) return false;
+        return hidden(bound_key, x0, x1, y0, y1);
+    }
+    [[gnu::noinline]] bool hidden(std::int32_t bound_key, std::int32_t x0, std::int32_t x1, std::int32_t y0,
+                                  std::int32_t y1) const {
         const rhi::CompareOperation operation = draw->depth_stencil.compare;
         const bool nearer = keeps_nearer(operation);
         const float inset = targets.samples == 1 ? 0.5f : 0.125f;
@@ -310,17 +332,17 @@ struct TileRun {
         const float y = static_cast<float>(tile_y + (lower ? y1 : y0)) + (lower ? 1.0f - inset : inset);
         const std::int32_t key = depth_key(targets.depth_layout, depth_at(x, y), depth_low, depth_high);
         switch (operation) {
-            case rhi::CompareOperation::less: return key >= region_bounds[region];
-            case rhi::CompareOperation::less_or_equal: return key > region_bounds[region];
-            case rhi::CompareOperation::greater: return key <= region_bounds[region];
-            default: return key < region_bounds[region];
+            case rhi::CompareOperation::less: return key >= bound_key;
+            case rhi::CompareOperation::less_or_equal: return key > bound_key;
+            case rhi::CompareOperation::greater: return key <= bound_key;
+            default: return key < bound_key;
         }
     }
 
     // ---- Fragments -----------------------------------------------------------------------------------------------
 
+    /// @param next  of the draw that has begun
     void begin_record(const Record& next, const std::byte* vertices) {
-        if (next.draw() != draw_index) begin_draw(next.draw());
         record = &next;
         vertex_memory = vertices;
         primitive = nullptr;
@@ -350,7 +372,7 @@ struct TileRun {
         if ((entered_regions >> region & 1) == 0) enter_region(region);
         const PrimitiveData* const from = &current_primitive();
         const std::uint32_t first = stream.quads;
-        for (std::uint32_t quad = 0; quad < 4; ++quad) stream.primitives[first + quad] = from;
+        repeat_pointer<4>(stream.primitives + first, from);
         const std::uint32_t used = append_quads(stream, place, live);
         if (covered) {
             std::uint32_t next = first;
@@ -370,10 +392,17 @@ struct TileRun {
             enter_region(static_cast<std::uint32_t>(__builtin_ctz(fresh)));
         Stream& stream = memory.streams[0];
         const PrimitiveData* const from = &current_primitive();
-        for (std::uint32_t quad = 0; quad < 16; ++quad) stream.primitives[stream.quads + quad] = from;
+        repeat_pointer<16>(stream.primitives + stream.quads, from);
         for (std::uint32_t block = 0; block < 4; ++block)
             append_quads(stream, place + four_blocks[block], live[block]);
         if (stream.quads >= stream_quads) flush_stream(0, stream_quads);
+    }
+    template <int count>
+    NACRE_LANES_INLINE static void repeat_pointer(const PrimitiveData** to, const PrimitiveData* from) {
+        using Pointers [[gnu::vector_size(32)]] = std::uint64_t;
+        static_assert(sizeof(from) == 8);
+        const Pointers four = Pointers{} + reinterpret_cast<std::uint64_t>(from);
+        for (int i = 0; i < count; i += 4) std::memcpy(to + i, &four, sizeof(four));
     }
     /// @return the quads that have a pixel, one bit for each
     NACRE_LANES_INLINE static std::uint32_t append_quads(Stream& stream, std::uint32_t place, std::uint32_t live) {
@@ -461,38 +490,48 @@ struct TileRun {
 
     /// The frequent case of `resolve`: one sample, tested before, nothing blended.
     void write_plain(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t quads) {
-        const std::uint32_t live = batch.live;
-        struct Words {
-            const std::uint32_t* from;
-            std::uint32_t offset;
-        };
-        Words words[8 * 4];
-        std::uint32_t count = 0;
         alignas(64) std::uint32_t packed[8][4][16];
-        for (std::uint32_t i = 0; i < draw->color_count; ++i) {
-            const ColorPlan& plan = draw->colors[i];
-            const ColorTarget& target = targets.colors[plan.target];
-            const std::uint32_t(*from)[16] = batch.colors[plan.output];
-            if (!plan.as_it_is) {
-                pack_colors(plan, target, *job.srgb, batch, packed[i]);
-                from = packed[i];
-            }
-            const std::uint32_t offset = color_offset(target, 0);
-            for (std::uint32_t word = 0; word < target.words; ++word)
-                words[count++] = {from[word], offset + 16 * word};
-        }
+        if (plain_from_batch != plain_count)
+            for (std::uint32_t i = 0; i < draw->color_count; ++i)
+                if (const ColorPlan& plan = draw->colors[i]; !plan.as_it_is)
+                    pack_colors(plan, targets.colors[plan.target], *job.srgb, batch, packed[i]);
+        const std::uint32_t live = batch.live, from_batch = plain_from_batch, count = plain_count;
+        const std::size_t block_words = targets.color_planes * 16;
+        std::uint32_t* const colors = memory.colors;
+        const PlainWord* const words = plain_words;
+        // What the fragment function has written as it is comes first.
+        const auto each = [&](std::uint32_t place, std::uint32_t lane, auto&& write) {
+            std::uint32_t* const to = colors + (place >> 4) * block_words + (place & 15);
+            std::uint32_t i = 0;
+            for (; i < from_batch; ++i) write(to + words[i].to, &batch.colors[0][0][0] + words[i].from + lane);
+            for (; i < count; ++i) write(to + words[i].to, &packed[0][0][0] + words[i].from + lane);
+        };
         if (quads == 4 && live == 0xffff && is_block(places)) {
-            std::uint32_t* const to = colors_at(places[0]);
-            for (std::uint32_t i = 0; i < count; ++i) store(to + words[i].offset, load(words[i].from));
+            each(places[0], 0, [](std::uint32_t* to, const std::uint32_t* from) { store(to, load(from)); });
             return;
         }
-        alignas(64) std::int32_t keep[16];
-        store(keep, select(lanes_of(live), ints(0), ints(-1)));
-        // Quads of unfilled batches repeat others, without a live pixel.
         for (std::uint32_t quad = 0; quad < quads; ++quad) {
-            std::uint32_t* const to = colors_at(places[quad]);
-            const Int4 kept = load4(keep + 4 * quad);
-            for (std::uint32_t i = 0; i < count; ++i) store_quad(to + words[i].offset, words[i].from + 4 * quad, kept);
+            // Quads of unfilled batches repeat others, without a live pixel.
+            const std::uint32_t pixels = live >> (4 * quad) & 15;
+            each(places[quad], 4 * quad, [&](std::uint32_t* to, const std::uint32_t* from) {
+                store_some4(to, load4(from), pixels);
+            });
+        }
+    }
+    /// Lists the words that write_plain writes.
+    void list_plain_words() {
+        plain_count = plain_from_batch = 0;
+        for (int part = 0; part < 2; ++part) {
+            const bool as_it_is = part == 0;
+            for (std::uint32_t i = 0; i < draw->color_count; ++i) {
+                const ColorPlan& plan = draw->colors[i];
+                if (plan.as_it_is != as_it_is) continue;
+                const ColorTarget& target = targets.colors[plan.target];
+                for (std::uint32_t word = 0; word < target.words; ++word)
+                    plain_words[plain_count++] = {((as_it_is ? plan.output : i) * 4 + word) * 16,
+                                                  color_offset(target, 0) + 16 * word};
+            }
+            if (as_it_is) plain_from_batch = plain_count;
         }
     }
     /// Whether four quads are those of one block, in their order.
@@ -608,12 +647,10 @@ struct TileRun {
                             store4(old[word] + 4 * quad, load4(colors_at(places[quad]) + offset + 16 * word));
                     blend_colors(*draw, plan, target, *job.srgb, batch, old, words);
                 }
-                alignas(64) std::int32_t keep[16];
-                store(keep, select(lanes_of(mask), ints(0), ints(-1)));
                 for (std::uint32_t quad = first_quad; quad < end_quad; ++quad)
                     for (std::uint32_t word = 0; word < target.words; ++word)
-                        store_quad(colors_at(places[quad]) + offset + 16 * word, words[word] + 4 * quad,
-                                   load4(keep + 4 * quad));
+                        store_some4(colors_at(places[quad]) + offset + 16 * word, load4(words[word] + 4 * quad),
+                                    mask >> (4 * quad) & 15);
             };
             if (!reads || !conflict) {
                 write(0, quads);

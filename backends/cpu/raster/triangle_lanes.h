@@ -43,12 +43,14 @@ struct CornerLanes {
     alignas(64) std::int32_t x[16], y[16], codes[16], offset[16];
     alignas(64) float window_x[16], window_y[16], window_z[16];
 
-    void gather(const TriangleSetup& work, const std::uint32_t* locals) {
-        for (int lane = 0; lane < 16; lane += 4) {
+    /// @param corner  of each triangle; those behind the last repeat the first
+    void gather(const TriangleSetup& work, std::uint32_t corner) {
+        for (std::uint32_t lane = 0; lane < 16; lane += 4) {
             Int4 fixed[4];
             Float4 window[4];
-            for (int i = 0; i < 4; ++i) {
-                const SetupVertex& vertex = work.vertices[locals[lane + i]];
+            for (std::uint32_t i = 0; i < 4; ++i) {
+                const std::uint32_t triangle = lane + i < work.count ? lane + i : 0;
+                const SetupVertex& vertex = work.vertices[work.corners[3 * triangle + corner]];
                 fixed[i] = load4(&vertex);
                 window[i] = load4(reinterpret_cast<const float*>(work.screen + std::size_t{vertex.offset} * 16));
             }
@@ -82,7 +84,7 @@ NACRE_LANES_INLINE Doubles depth_bias(const TriangleSetup& work, Doubles slope, 
 
 inline void set_up_triangles(TriangleSetup& work) {
     CornerLanes corners[3];
-    for (int i = 0; i < 3; ++i) corners[i].gather(work, work.locals[i]);
+    for (std::uint32_t i = 0; i < 3; ++i) corners[i].gather(work, i);
     const CornerLanes &a = corners[0], &b = corners[1], &c = corners[2];
 
     const auto has = [](const Ints& codes, std::uint32_t bits) {

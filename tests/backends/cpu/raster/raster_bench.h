@@ -257,6 +257,8 @@ class Bench {
         begin();
     }
     void begin() { rasterizer_.begin_pass(targets_); }
+    /// What the next pass that begins has.
+    cpu::RenderTargets& targets() { return targets_; }
 
     template <TestShader shader>
     void use(std::uint32_t components = 4) {
