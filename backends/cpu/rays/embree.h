@@ -29,9 +29,11 @@ struct CallContext {
     RTCIntersectContext context;
 
     /// @param is_coherent  the rays of a packet go about the same way
+    /// @param instance     what hits get as instance that are in none
     /// @param filter       called for each hit of any geometry, or null
-    explicit CallContext(bool is_coherent, Filter filter = nullptr) {
+    CallContext(bool is_coherent, unsigned instance, Filter filter = nullptr) {
         rtcInitIntersectContext(&context);
+        context.instID[0] = instance;
         context.flags = is_coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
         context.filter = filter;
     }

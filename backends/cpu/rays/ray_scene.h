@@ -117,8 +117,12 @@ class RayScene {
 
     /// Null before the first build.
     [[nodiscard]] RTCSceneTy* scene() const { return scene_; }
+    /// What hits get as instance where `scene` is that of a mesh, without instances; else Embree's sign for none.
+    [[nodiscard]] std::uint32_t only_instance() const { return only_instance_; }
     [[nodiscard]] const std::vector<RayInstance>& instances() const { return instances_; }
-    [[nodiscard]] std::uint32_t packet_width() const { return device_->packet_width(); }
+    [[nodiscard]] std::uint32_t packet_width() const { return packet_width_; }
+    /// Rays whose origins are this near to each other (squared) and go the same way are better traced as coherent.
+    [[nodiscard]] float coherent_spread2() const { return coherent_spread2_; }
     /// Some geometry gives candidates unless a ray says otherwise.
     [[nodiscard]] bool has_candidates() const { return has_candidates_; }
     /// Some instance overrules the opacity of its geometry.
@@ -129,13 +133,13 @@ class RayScene {
     std::shared_ptr<RayDevice> device_;
     std::vector<RayInstance> instances_;
     RTCSceneTy* scene_ = nullptr;
+    std::uint32_t only_instance_, packet_width_;
+    float coherent_spread2_ = 0;
     bool allow_update_, has_candidates_ = false, has_overrides_ = false;
     rhi::BuildPreference prefer_;
 };
 
-/// Rays and instances beyond these are never hit, so that Embree, which takes numbers below 1.8e18, gets none larger in
-/// the space of any object.
-inline constexpr float largest_ray_coordinate = 1e10f;
+/// Instances whose inverses go beyond these are never hit; see `largest_ray_coordinate`.
 inline constexpr float largest_inverse_element = 1e7f;
 inline constexpr float largest_inverse_offset = 1e17f;
 /// Triangles with vertices beyond this are never hit.
