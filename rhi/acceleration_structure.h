@@ -83,6 +83,14 @@ struct AccelerationStructureInstance {
     InstanceFlags flags = InstanceFlags::none;
 };
 
+/// World to object of an instance with this transform, three rows of four. Nothing where the instance is never hit: where its
+/// matrix has no inverse, or one with elements beyond `largest_inverse_element` or an offset beyond `largest_inverse_offset`.
+std::optional<std::array<float, 12>> inverse_of(const std::array<float, 12>& transform);
+
+/// With rays up to 1e10 these keep every number in the space of an object far from the largest float.
+inline constexpr float largest_inverse_element = 1e7f;
+inline constexpr float largest_inverse_offset = 1e17f;
+
 /// What all devices with ray queries can take.
 inline constexpr std::uint32_t max_structure_primitives = (1u << 29) - 1;  ///< Of all geometries of a bottom level.
 inline constexpr std::uint32_t max_structure_geometries = (1u << 16) - 1;

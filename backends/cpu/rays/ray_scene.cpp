@@ -18,31 +18,6 @@ void report(void*, RTCError code, const char* text) {
     log_message(LogLevel::debug, fmt::format("Embree says ({}): {}", static_cast<int>(code), text ? text : ""));
 }
 
-/// Inverse of an affine matrix of three rows of four, in double precision; false where there is none that Embree can use.
-bool invert(const std::array<float, 12>& matrix, std::array<float, 12>& inverse) {
-    const auto m = [&](int row, int column) { return static_cast<double>(matrix[static_cast<std::size_t>(row * 4 + column)]); };
-    double cofactors[3][3];
-    for (int row = 0; row < 3; ++row)
-        for (int column = 0; column < 3; ++column) {
-            const int r1 = (row + 1) % 3, r2 = (row + 2) % 3, c1 = (column + 1) % 3, c2 = (column + 2) % 3;
-            cofactors[row][column] = m(r1, c1) * m(r2, c2) - m(r1, c2) * m(r2, c1);
-        }
-    const double determinant = m(0, 0) * cofactors[0][0] + m(0, 1) * cofactors[0][1] + m(0, 2) * cofactors[0][2];
-    if (!std::isfinite(determinant) || determinant == 0.0) return false;
-    for (int row = 0; row < 3; ++row) {
-        double offset = 0;
-        for (int column = 0; column < 3; ++column) {
-            const double element = cofactors[column][row] / determinant;
-            if (!(std::abs(element) <= largest_inverse_element)) return false;
-            inverse[static_cast<std::size_t>(row * 4 + column)] = static_cast<float>(element);
-            offset -= element * m(column, 3);
-        }
-        if (!(std::abs(offset) <= largest_inverse_offset)) return false;
-        inverse[static_cast<std::size_t>(row * 4 + 3)] = static_cast<float>(offset);
-    }
-    return true;
-}
-
 /// Whether an instance is its mesh as it stands, for all rays.
 bool is_in_place(const RayInstance& instance) {
     constexpr std::array<float, 12> identity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
@@ -235,7 +210,9 @@ void RayScene::build(std::vector<RayInstance> instances, bool) {
         RayInstance& instance = instances[i];
         if (!instance.mesh || !instance.mesh->scene() || !instance.mesh->has_triangles() || (instance.mask & 0xff) == 0)
             continue;
-        if (!invert(instance.to_world, instance.to_object)) continue;
+        const auto to_object = rhi::inverse_of(instance.to_world);
+        if (!to_object) continue;
+        instance.to_object = *to_object;
         usable.push_back(i);
         if (has_any(instance.flags, rhi::InstanceFlags::force_no_opaque)) {
             has_candidates = true;

@@ -139,9 +139,6 @@ class RayScene {
     rhi::BuildPreference prefer_;
 };
 
-/// Instances whose inverses go beyond these are never hit; see `largest_ray_coordinate`.
-inline constexpr float largest_inverse_element = 1e7f;
-inline constexpr float largest_inverse_offset = 1e17f;
 /// Triangles with vertices beyond this are never hit.
 inline constexpr float largest_vertex_coordinate = 1e17f;
 
