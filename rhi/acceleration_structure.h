@@ -66,7 +66,7 @@ struct GeometrySource {
 enum class InstanceFlags : std::uint32_t {
     none = 0,
     disable_culling = 1,  ///< Rays that cull by facing see both sides.
-    flip_facing = 2,      ///< Front faces have their vertices counterclockwise as seen from the ray's origin, not clockwise.
+    flip_facing = 2,      ///< Fronts become backs. The front of (a, b, c) is where cross(b - a, c - a) points to, in the object's space.
     force_opaque = 4,
     force_no_opaque = 8,
 };

@@ -114,7 +114,7 @@ void judge(const RTCFilterFunctionNArguments* arguments) {
             const float cosine = RTCRayN_dir_x(arguments->ray, arguments->N, i) * candidate.normal[0] +
                                  RTCRayN_dir_y(arguments->ray, arguments->N, i) * candidate.normal[1] +
                                  RTCRayN_dir_z(arguments->ray, arguments->N, i) * candidate.normal[2];
-            const bool is_front = (cosine > 0) != has_any(instance.flags, rhi::InstanceFlags::flip_facing);
+            const bool is_front = (cosine < 0) != has_any(instance.flags, rhi::InstanceFlags::flip_facing);
             is_culled = is_culled || (ray_flags & (is_front ? ray_cull_front_facing : ray_cull_back_facing)) != 0;
         }
         if (is_culled) {
