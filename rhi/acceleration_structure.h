@@ -25,8 +25,9 @@ namespace nacre::rhi {
 
 enum class AccelerationStructureLevel : std::uint8_t { bottom, top };
 
-/// Kinds of geometry. Boxes and curves have their place here; no device offers them yet, and asking for one is an error
-/// of code unsupported.
+/// Kinds of geometry. A box is a place where a ray may hit something of the shader's own: it is always a candidate, which the shader
+/// answers with the distance of its hit (rayQueryGenerateIntersectionEXT). Curves have their place here; no device offers them yet,
+/// and asking for them is an error of code unsupported.
 enum class GeometryType : std::uint8_t { triangles, boxes, curves };
 
 /// What a build spends its time for.
@@ -36,18 +37,21 @@ enum class BuildPreference : std::uint8_t { fast_trace, fast_build };
 struct GeometryDesc {
     GeometryType type = GeometryType::triangles;
     /// Hits count at once. Otherwise they are candidates that the shader confirms (alpha test), unless an instance or a ray
-    /// says otherwise.
+    /// says otherwise. Of boxes: what rayQueryGetIntersectionCandidateAABBOpaqueEXT says.
     bool opaque = true;
-    std::uint32_t primitive_count = 0;                ///< Triangles; 0 is an empty geometry.
+    std::uint32_t primitive_count = 0;                ///< Triangles or boxes; 0 is an empty geometry.
     Format vertex_format = Format::rgb32_float;       ///< The only one.
-    std::uint32_t vertex_count = 0;
-    std::uint32_t vertex_stride = 12;                 ///< Bytes; a multiple of 4, 12 to 65,536.
+    std::uint32_t vertex_count = 0;                   ///< Of boxes 0.
+    /// Bytes from vertex to vertex: a multiple of 4, 12 to 65,536. Of boxes, which are six floats (least x, y, z, then largest), from
+    /// box to box: a multiple of 8, 24 to 65,536.
+    std::uint32_t vertex_stride = 12;
     std::optional<IndexType> index_type = {};         ///< Nothing: three vertices in a row make a triangle.
 };
 
 struct AccelerationStructureDesc {
     AccelerationStructureLevel level = AccelerationStructureLevel::bottom;
-    std::vector<GeometryDesc> geometries = {};        ///< Bottom levels; the index is what shaders read as geometry index.
+    /// Of bottom levels, all of one type; the index is what shaders read as geometry index.
+    std::vector<GeometryDesc> geometries = {};
     std::uint32_t max_instances = 0;                  ///< Top levels.
     bool allow_update = false;                        ///< `CommandList::update_acceleration_structure` may be used.
     BuildPreference prefer = BuildPreference::fast_trace;
@@ -56,8 +60,8 @@ struct AccelerationStructureDesc {
 
 /// Where the data of one geometry lies while it is built. The structure does not refer to it afterwards.
 struct GeometrySource {
-    Buffer vertices{};                 ///< With usage acceleration_structure_input.
-    std::uint64_t vertex_offset = 0;   ///< Bytes; a multiple of 4.
+    Buffer vertices{};                 ///< Or boxes. With usage acceleration_structure_input.
+    std::uint64_t vertex_offset = 0;   ///< Bytes; a multiple of 4, of boxes of 8.
     Buffer indices{};                  ///< The same, where the geometry has an index type.
     std::uint64_t index_offset = 0;    ///< Bytes; a multiple of the size of an index.
 };

@@ -38,16 +38,22 @@ void AccelerationStructure::describe(const rhi::AccelerationStructureDesc& struc
     for (const rhi::GeometryDesc& from : structure.geometries) {
         VkAccelerationStructureGeometryKHR& to = shape.geometries.emplace_back();
         to = {VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_GEOMETRY_KHR};
-        to.geometryType = VK_GEOMETRY_TYPE_TRIANGLES_KHR;
+        shape.counts.push_back(from.primitive_count);
         // Each hit is one candidate, as on the other backends.
         to.flags = from.opaque ? VK_GEOMETRY_OPAQUE_BIT_KHR : VK_GEOMETRY_NO_DUPLICATE_ANY_HIT_INVOCATION_BIT_KHR;
+        if (from.type == rhi::GeometryType::boxes) {
+            to.geometryType = VK_GEOMETRY_TYPE_AABBS_KHR;
+            to.geometry.aabbs = {VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_GEOMETRY_AABBS_DATA_KHR};
+            to.geometry.aabbs.stride = from.vertex_stride;
+            continue;
+        }
+        to.geometryType = VK_GEOMETRY_TYPE_TRIANGLES_KHR;
         VkAccelerationStructureGeometryTrianglesDataKHR& triangles = to.geometry.triangles;
         triangles = {VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_GEOMETRY_TRIANGLES_DATA_KHR};
         triangles.vertexFormat = to_vulkan(from.vertex_format);
         triangles.vertexStride = from.vertex_stride;
         triangles.maxVertex = std::max(from.vertex_count, 1u) - 1;
         triangles.indexType = index_type_of(from);
-        shape.counts.push_back(from.primitive_count);
     }
     shape.info.type = is_top ? VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_KHR : VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_KHR;
     shape.info.flags = structure.prefer == rhi::BuildPreference::fast_build
@@ -141,15 +147,19 @@ Expected<void> AccelerationStructure::record_build(VkCommandBuffer commands,
     } else {
         for (std::uint32_t i = 0; i < command.count; ++i) {
             const rhi::GeometrySourceCommand& source = command.sources()[i];
-            VkAccelerationStructureGeometryTrianglesDataKHR& triangles = shape.geometries[i].geometry.triangles;
+            ranges[i].primitiveCount = shape.counts[i];
             const auto address = [&](const rhi::BufferReference& buffer, std::uint64_t offset) {
                 // An empty geometry needs an address, too; nothing is read there.
                 return buffer.object ? native(*buffer.object).address() + offset : scratch_address;
             };
+            if (shape.geometries[i].geometryType == VK_GEOMETRY_TYPE_AABBS_KHR) {
+                shape.geometries[i].geometry.aabbs.data.deviceAddress = address(source.vertices, source.vertex_offset);
+                continue;
+            }
+            VkAccelerationStructureGeometryTrianglesDataKHR& triangles = shape.geometries[i].geometry.triangles;
             triangles.vertexData.deviceAddress = address(source.vertices, source.vertex_offset);
             if (triangles.indexType != VK_INDEX_TYPE_NONE_KHR)
                 triangles.indexData.deviceAddress = address(source.indices, source.index_offset);
-            ranges[i].primitiveCount = shape.counts[i];
         }
     }
     shape.info.mode = is_update ? VK_BUILD_ACCELERATION_STRUCTURE_MODE_UPDATE_KHR : VK_BUILD_ACCELERATION_STRUCTURE_MODE_BUILD_KHR;

@@ -75,6 +75,16 @@ std::vector<Breach> structure_breaches() {
         {"N-202", [](Bench& b) { (void)b.device().create_buffer({.size = 16, .usage = input}); }, without},
         {"N-260", [](Bench& b) { (void)b.device().create_acceleration_structure(bottom_desc()); }, without},
         {"N-260", [](Bench& b) { bottom_with(b, [](auto& d) { d.geometries[0].type = GeometryType::curves; }); }},
+        // Boxes with the stride of vertices, with indices, and beside triangles.
+        {"N-262", [](Bench& b) {
+             bottom_with(b, [](auto& d) { d.geometries.push_back({.type = GeometryType::boxes, .vertex_stride = 24}); });
+         }},
+        {"N-262", [](Bench& b) { bottom_with(b, [](auto& d) { d.geometries = {{.type = GeometryType::boxes, .primitive_count = 1}}; }); }},
+        {"N-262", [](Bench& b) {
+             bottom_with(b, [](auto& d) {
+                 d.geometries = {{.type = GeometryType::boxes, .vertex_stride = 24, .index_type = IndexType::uint16}};
+             });
+         }},
         {"N-260",
          [](Bench& b) {
              (void)b.device().create_bind_group_layout(

@@ -271,6 +271,10 @@ bool Emitter::emit_ray(const Instruction& at) {
         set(at, ray_property(at.operand(0), static_cast<std::uint32_t>(property) | (is_committed() ? ray_property_committed : 0), words, scalar));
         return true;
     };
+    const auto candidate_kind = [&] {
+        const std::size_t offset = offsetof(RayQueryLanes, candidate_kind);
+        return read_query(at.operand(0), std::span(&offset, 1), word).at(0).value;
+    };
     switch (at.op) {
         case Op::OpRayQueryInitializeKHR: {
             const Component descriptor_address = get(at.operand(1)).image;
@@ -326,13 +330,19 @@ bool Emitter::emit_ray(const Instruction& at) {
             });
             return true;
         }
-        case Op::OpRayQueryGenerateIntersectionKHR:
-            // Only candidates that are boxes may be answered so, and no acceleration structure has boxes.
+        case Op::OpRayQueryGenerateIntersectionKHR: {
+            llvm::FunctionCallee function = external("nacre_cpu_ray_generate", builder.getVoidTy(), {pointer_type, word, pointer_type});
+            llvm::AllocaInst* distances = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), row_bytes), "distances");
+            builder.CreateAlignedStore(widen(get_scalar(at.operand(1))), distances, llvm::Align(64));
+            for_each_query(at.operand(0), [&](llvm::Value* query, llvm::Value* lanes_on) {
+                builder.CreateCall(function, {query, mask_bits(lanes_on), distances});
+            });
             return true;
+        }
         case Op::OpRayQueryGetIntersectionTypeKHR: {
             if (!is_committed()) {
-                // Candidates are triangles: type 0.
-                set(at, {Component(llvm::Constant::getNullValue(vector_of(word)))});
+                // The bit is GLSL's number for a box, and a triangle is 0.
+                set(at, {Component(builder.CreateAnd(candidate_kind(), splat(int32(ray_candidate_box))))});
                 return true;
             }
             const std::array<std::size_t, 3> offsets{offsetof(RayQueryLanes, geometry), offsetof(RayQueryLanes, kind),
@@ -374,8 +384,8 @@ bool Emitter::emit_ray(const Instruction& at) {
         case Op::OpRayQueryGetIntersectionObjectToWorldKHR: return get_property(RayProperty::object_to_world, 12, real);
         case Op::OpRayQueryGetIntersectionWorldToObjectKHR: return get_property(RayProperty::world_to_object, 12, real);
         case Op::OpRayQueryGetIntersectionCandidateAABBOpaqueKHR:
-            // No acceleration structure has boxes.
-            set(at, {Component(llvm::Constant::getNullValue(mask_type))});
+            set(at, {Component(builder.CreateICmpNE(builder.CreateAnd(candidate_kind(), splat(int32(ray_candidate_opaque))),
+                                                    llvm::Constant::getNullValue(vector_of(word))))});
             return true;
         case Op::OpRayQueryGetRayTMinKHR: {
             const std::size_t offset = offsetof(RayQueryLanes, t_min);

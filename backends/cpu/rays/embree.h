@@ -44,6 +44,13 @@ inline CallContext& context_of(const RTCFilterFunctionNArguments& arguments) {
     return *reinterpret_cast<CallContext*>(arguments.context);
 }
 
+/// The context of the call that meets a geometry of the program's own.
+inline CallContext& context_of(const RTCIntersectFunctionNArguments& arguments) {
+    return *reinterpret_cast<CallContext*>(arguments.context);
+}
+/// The instance that such a geometry is met in.
+inline unsigned instance_of(const RTCIntersectFunctionNArguments& arguments) { return arguments.context->instID[0]; }
+
 inline void intersect(RTCScene scene, CallContext& call, RTCRayHit& ray) { rtcIntersect1(scene, &call.context, &ray); }
 inline void intersect(RTCScene scene, CallContext& call, const int* valid, RTCRayHit4& rays) {
     rtcIntersect4(valid, scene, &call.context, &rays);

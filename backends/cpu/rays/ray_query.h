@@ -37,10 +37,18 @@ enum class RayStatus : std::uint32_t {
     finished,
 };
 
+/// What a candidate is, as bits.
+enum RayCandidateKind : std::uint32_t {
+    ray_candidate_box = 1,     ///< Otherwise a triangle.
+    ray_candidate_opaque = 2,  ///< Of a box.
+};
+
 /// A hit that the shader has to judge.
 struct RayCandidate {
-    float t, u, v;
+    float t;     ///< Where the ray enters a box; its hit is not known.
+    float u, v;
     std::uint32_t primitive, geometry, instance;
+    std::uint32_t kind;  ///< RayCandidateKind
     float normal[3];  ///< Not normalized, in the space of the object: cross(v1 - v0, v2 - v0).
 };
 
@@ -71,6 +79,7 @@ struct alignas(64) RayQueryLanes {
     float candidate_t[max_lanes], candidate_u[max_lanes], candidate_v[max_lanes];
     float candidate_normal[3][max_lanes];
     std::uint32_t candidate_primitive[max_lanes], candidate_geometry[max_lanes], candidate_instance[max_lanes];
+    std::uint32_t candidate_kind[max_lanes];  ///< RayCandidateKind
 
     // Candidates behind it, by rising distance; valid in lanes that wait.
     std::uint32_t next_candidate[max_lanes], candidate_count[max_lanes];
@@ -119,12 +128,15 @@ using RayProceedFunction = std::uint32_t (*)(RayQueryLanes* query, std::uint32_t
                                              float spread2);
 /// Commits the candidate of the lanes of `live`.
 using RayConfirmFunction = void (*)(RayQueryLanes* query, std::uint32_t live);
+/// Commits a hit in the box that the lanes of `live` stand at, at the distances `t`, an array of max_lanes.
+using RayGenerateFunction = void (*)(RayQueryLanes* query, std::uint32_t live, const float* t);
 /// Writes words of a property, an array of max_lanes for each, for the lanes of `live`; zero where there is no hit.
 using RayPropertyFunction = void (*)(const RayQueryLanes* query, std::uint32_t property, std::uint32_t live,
                                      std::uint32_t* result);
 
 RayProceedFunction ray_proceed_function();
 RayConfirmFunction ray_confirm_function();
+RayGenerateFunction ray_generate_function();
 RayPropertyFunction ray_property_function();
 
 }  // namespace nacre::cpu

@@ -79,6 +79,7 @@ RayMesh::RayMesh(std::shared_ptr<RayDevice> device, std::vector<rhi::GeometryDes
     : device_(std::move(device)),
       geometries_(std::move(geometries)),
       attached_(geometries_.size(), nullptr),
+      boxes_(geometries_.size()),
       allow_update_(allow_update),
       prefer_(prefer) {}
 
@@ -91,35 +92,75 @@ void RayMesh::start() {
     if (scene_) rtcReleaseScene(scene_);
     scene_ = nullptr;
     scene_ = new_scene(device_->handle(), prefer_, allow_update_);
-    has_triangles_ = has_opaque_ = has_non_opaque_ = false;
+    has_triangles_ = has_boxes_ = has_opaque_ = has_non_opaque_ = false;
     bytes_ = 0;
-    for (std::size_t i = 0; i < geometries_.size(); ++i) {
-        attached_[i] = nullptr;
-        const rhi::GeometryDesc& desc = geometries_[i];
-        if (desc.primitive_count == 0 || desc.vertex_count == 0) continue;
-        RTCGeometry geometry = rtcNewGeometry(device_->handle(), RTC_GEOMETRY_TYPE_TRIANGLE);
-        if (!geometry) throw std::bad_alloc();
-        // The scene keeps it.
-        rtcAttachGeometryByID(scene_, geometry, static_cast<unsigned>(i));
-        rtcReleaseGeometry(geometry);
-        if (!rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, desc.vertex_count) ||
-            !rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, desc.primitive_count))
-            throw std::bad_alloc();
-        rtcSetGeometryBuildQuality(geometry, quality_of(prefer_));
-        if (!desc.opaque) set_candidate_filter(geometry);
-        attached_[i] = geometry;
-        bytes_ += std::uint64_t{12} * desc.vertex_count + std::uint64_t{12} * desc.primitive_count;
-        has_triangles_ = true;
-        (desc.opaque ? has_opaque_ : has_non_opaque_) = true;
-    }
+    for (std::size_t i = 0; i < geometries_.size(); ++i) attached_[i] = attach(i);
 }
 
-bool RayMesh::fill(std::size_t index, const RayGeometrySource& source, bool is_update) {
+RTCGeometry RayMesh::attach(std::size_t index) {
+    const rhi::GeometryDesc& desc = geometries_[index];
+    const bool is_boxes = desc.type == rhi::GeometryType::boxes;
+    if (desc.primitive_count == 0 || (desc.vertex_count == 0 && !is_boxes)) return nullptr;
+    RTCGeometry geometry = rtcNewGeometry(device_->handle(), is_boxes ? RTC_GEOMETRY_TYPE_USER : RTC_GEOMETRY_TYPE_TRIANGLE);
+    if (!geometry) throw std::bad_alloc();
+    // The scene keeps it.
+    rtcAttachGeometryByID(scene_, geometry, static_cast<unsigned>(index));
+    rtcReleaseGeometry(geometry);
+    rtcSetGeometryBuildQuality(geometry, quality_of(prefer_));
+    if (is_boxes) {
+        boxes_[index].boxes.resize(desc.primitive_count);
+        rtcSetGeometryUserPrimitiveCount(geometry, desc.primitive_count);
+        set_boxes(geometry, boxes_[index]);
+        bytes_ += sizeof(RayBoxes::Box) * std::uint64_t{desc.primitive_count};
+        has_boxes_ = true;
+        return geometry;
+    }
+    if (!rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, desc.vertex_count) ||
+        !rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, desc.primitive_count))
+        throw std::bad_alloc();
+    if (!desc.opaque) set_candidate_filter(geometry);
+    bytes_ += std::uint64_t{12} * desc.vertex_count + std::uint64_t{12} * desc.primitive_count;
+    has_triangles_ = true;
+    (desc.opaque ? has_opaque_ : has_non_opaque_) = true;
+    return geometry;
+}
+
+void RayMesh::fill(std::size_t index, const RayGeometrySource& source, bool is_update) {
+    if (geometries_[index].type == rhi::GeometryType::boxes) fill_boxes(index, source, is_update);
+    else fill_triangles(index, source, is_update);
+    rtcCommitGeometry(attached_[index]);
+}
+
+void RayMesh::fill_boxes(std::size_t index, const RayGeometrySource& source, bool is_update) {
+    const rhi::GeometryDesc& desc = geometries_[index];
+    RayBoxes& to = boxes_[index];
+    bool has_stand_in = false;
+    for (std::uint32_t i = 0; i < desc.primitive_count; ++i) {
+        RayBoxes::Box& box = to.boxes[i];
+        const std::uint64_t at = std::uint64_t{i} * desc.vertex_stride;
+        bool is_good = at + sizeof box <= source.vertex_bytes;
+        if (is_good) {
+            std::memcpy(&box, source.vertices + at, sizeof box);
+            for (int axis = 0; axis < 3; ++axis)
+                is_good = is_good && box.lower[axis] <= box.upper[axis] && box.lower[axis] >= -largest_vertex_coordinate &&
+                          box.upper[axis] <= largest_vertex_coordinate;
+        }
+        if (!is_good) {
+            box = {{1, 1, 1}, {0, 0, 0}};
+        } else if (!has_stand_in) {
+            has_stand_in = true;
+            to.stand_in = {box.lower[0], box.lower[1], box.lower[2]};
+        }
+    }
+    if (is_update) rtcSetGeometryBuildQuality(attached_[index], RTC_BUILD_QUALITY_REFIT);
+}
+
+void RayMesh::fill_triangles(std::size_t index, const RayGeometrySource& source, bool is_update) {
     const rhi::GeometryDesc& desc = geometries_[index];
     RTCGeometry geometry = attached_[index];
     auto* positions = static_cast<float*>(rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_VERTEX, 0));
     auto* triangles = static_cast<std::uint32_t*>(rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_INDEX, 0));
-    if (!positions || !triangles) return false;
+    if (!positions || !triangles) throw std::bad_alloc();
     // Vertices that cannot be, become the first that can; triangles with one of them shrink to a point, which nothing hits.
     std::vector<bool> is_bad;
     float stand_in[3] = {0, 0, 0};
@@ -179,15 +220,13 @@ bool RayMesh::fill(std::size_t index, const RayGeometrySource& source, bool is_u
         if (indices_changed) rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0);
         rtcSetGeometryBuildQuality(geometry, indices_changed ? quality_of(prefer_) : RTC_BUILD_QUALITY_REFIT);
     }
-    rtcCommitGeometry(geometry);
-    return true;
 }
 
 void RayMesh::build(std::span<const RayGeometrySource> sources, bool is_update) {
     is_update = is_update && scene_ && allow_update_;
     if (!is_update) start();
     for (std::size_t i = 0; i < geometries_.size() && i < sources.size(); ++i)
-        if (attached_[i] && !fill(i, sources[i], is_update)) throw std::bad_alloc();
+        if (attached_[i]) fill(i, sources[i], is_update);
     rtcCommitScene(scene_);
     device_->check_memory();
 }
@@ -205,15 +244,16 @@ RayScene::~RayScene() {
 
 void RayScene::build(std::vector<RayInstance> instances, bool) {
     std::vector<std::size_t> usable;
-    bool has_candidates = false, has_overrides = false;
+    bool has_candidates = false, has_overrides = false, has_boxes = false;
     for (std::size_t i = 0; i < instances.size(); ++i) {
         RayInstance& instance = instances[i];
-        if (!instance.mesh || !instance.mesh->scene() || !instance.mesh->has_triangles() || (instance.mask & 0xff) == 0)
+        if (!instance.mesh || !instance.mesh->scene() || !instance.mesh->has_primitives() || (instance.mask & 0xff) == 0)
             continue;
         const auto to_object = rhi::inverse_of(instance.to_world);
         if (!to_object) continue;
         instance.to_object = *to_object;
         usable.push_back(i);
+        has_boxes = has_boxes || instance.mesh->has_boxes();
         if (has_any(instance.flags, rhi::InstanceFlags::force_no_opaque)) {
             has_candidates = true;
             has_overrides = has_overrides || instance.mesh->has_opaque();
@@ -254,6 +294,7 @@ void RayScene::build(std::vector<RayInstance> instances, bool) {
     instances_ = std::move(instances);
     has_candidates_ = has_candidates;
     has_overrides_ = has_overrides;
+    has_boxes_ = has_boxes;
     coherent_spread2_ = 0;
     if (!usable.empty()) {
         RTCBounds bounds;

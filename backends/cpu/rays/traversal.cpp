@@ -3,7 +3,7 @@
 // - Where every hit counts at once, one packet of Embree on the query's own memory.
 // - Where some geometry is not opaque, one packet whose filter collects candidates by the way and lets the ray go on; the shader then
 //   gets them by rising distance. Of the candidates of a lane only the nearest `kept_candidates` have room.
-// - Where that room was too small, or a ray or instance overrules opacity or culls, one ray at a time with a filter for all geometry.
+// - Where that room was too small, there are boxes, or a ray or instance overrules opacity or culls, one ray at a time with a filter for all geometry.
 //   It begins behind the last candidate that the shader saw. A single ray gives a triangle the same distance each time, a packet may
 //   not, so what is found here is in one order: that of (distance, instance, geometry, primitive).
 #include "backends/cpu/rays/traversal.h"
@@ -72,6 +72,7 @@ RayCandidate candidate_of(const RTCFilterFunctionNArguments& arguments, unsigned
             RTCHitN_primID(hit, n, i),
             RTCHitN_geomID(hit, n, i),
             RTCHitN_instID(hit, n, i, 0),
+            0,
             {RTCHitN_Ng_x(hit, n, i), RTCHitN_Ng_y(hit, n, i), RTCHitN_Ng_z(hit, n, i)}};
 }
 
@@ -98,7 +99,20 @@ bool counts_at_once(const RayInstance& instance, std::uint32_t geometry, std::ui
     return instance.mesh->is_opaque(geometry);
 }
 
-/// Of all geometry, for a single ray.
+/// Whether a ray passes by what is opaque, or by what is not.
+bool culls(std::uint32_t ray_flags, bool is_opaque) {
+    return (ray_flags & (is_opaque ? ray_cull_opaque : ray_cull_no_opaque)) != 0;
+}
+
+/// Keeps a candidate of a single ray, unless it was seen before.
+void keep_single(Call& call, const RayCandidate& candidate) {
+    if (call.has_last && order_of(candidate) <= order_of(call.last)) return;
+    RayQueryLanes& query = call.query;
+    if (keep(query.candidates[call.lane], query.candidate_count[call.lane], candidate) == Kept::no_room)
+        query.has_more[call.lane] = 1;
+}
+
+/// Of all triangles, for a single ray.
 void judge(const RTCFilterFunctionNArguments* arguments) {
     auto& call = static_cast<Call&>(embree::context_of(*arguments));
     const std::uint32_t ray_flags = call.query.flags[call.lane];
@@ -107,7 +121,7 @@ void judge(const RTCFilterFunctionNArguments* arguments) {
         const RayCandidate candidate = candidate_of(*arguments, i);
         const RayInstance& instance = call.scene.instances()[candidate.instance];
         const bool is_opaque = counts_at_once(instance, candidate.geometry, ray_flags);
-        bool is_culled = (ray_flags & (is_opaque ? ray_cull_opaque : ray_cull_no_opaque)) != 0;
+        bool is_culled = culls(ray_flags, is_opaque) || (ray_flags & ray_skip_triangles) != 0;
         if ((ray_flags & (ray_cull_back_facing | ray_cull_front_facing)) != 0 &&
             !has_any(instance.flags, rhi::InstanceFlags::disable_culling)) {
             // The ray that a filter sees is in the space of the object, as the normal is.
@@ -122,16 +136,54 @@ void judge(const RTCFilterFunctionNArguments* arguments) {
             continue;
         }
         if (is_opaque) continue;
-        if (call.has_last && order_of(candidate) <= order_of(call.last)) {
-            arguments->valid[i] = 0;
-            continue;
-        }
-        RayQueryLanes& query = call.query;
-        if (keep(query.candidates[call.lane], query.candidate_count[call.lane], candidate) == Kept::no_room)
-            query.has_more[call.lane] = 1;
+        keep_single(call, candidate);
         arguments->valid[i] = 0;
     }
 }
+
+void bound_box(const RTCBoundsFunctionArguments* arguments) {
+    const auto& all = *static_cast<const RayBoxes*>(arguments->geometryUserPtr);
+    const RayBoxes::Box& box = all.boxes[arguments->primID];
+    const bool is_usable = box.is_usable();
+    const float* lower = is_usable ? box.lower : all.stand_in.data();
+    const float* upper = is_usable ? box.upper : all.stand_in.data();
+    RTCBounds& bounds = *arguments->bounds_o;
+    bounds.lower_x = lower[0], bounds.lower_y = lower[1], bounds.lower_z = lower[2];
+    bounds.upper_x = upper[0], bounds.upper_y = upper[1], bounds.upper_z = upper[2];
+}
+
+/// A box that a ray may go through. It shortens no ray: where its hit lies, the shader says.
+void meet_box(const RTCIntersectFunctionNArguments* arguments) {
+    auto& call = static_cast<Call&>(embree::context_of(*arguments));
+    if (call.way != Call::Way::single || arguments->N != 1 || arguments->valid[0] == 0) return;
+    const RayBoxes::Box& box = static_cast<const RayBoxes*>(arguments->geometryUserPtr)->boxes[arguments->primID];
+    const std::uint32_t ray_flags = call.query.flags[call.lane], instance = embree::instance_of(*arguments);
+    if (!box.is_usable() || (ray_flags & ray_skip_boxes) || instance >= call.scene.instances().size()) return;
+    const bool is_opaque = counts_at_once(call.scene.instances()[instance], arguments->geomID, ray_flags);
+    if (culls(ray_flags, is_opaque)) return;
+    RTCRayN* ray = RTCRayHitN_RayN(arguments->rayhit, 1);
+    const float origin[3] = {RTCRayN_org_x(ray, 1, 0), RTCRayN_org_y(ray, 1, 0), RTCRayN_org_z(ray, 1, 0)};
+    const float direction[3] = {RTCRayN_dir_x(ray, 1, 0), RTCRayN_dir_y(ray, 1, 0), RTCRayN_dir_z(ray, 1, 0)};
+    // From where the query begins, not the ray, which may begin behind what was seen: a box must come at the same distance each time.
+    float enters = call.query.t_min[call.lane], leaves = RTCRayN_tfar(ray, 1, 0);
+    constexpr float rounding = 4 * std::numeric_limits<float>::epsilon();
+    for (int axis = 0; axis < 3; ++axis) {
+        if (direction[axis] == 0) {
+            if (origin[axis] < box.lower[axis] || origin[axis] > box.upper[axis]) return;
+            continue;
+        }
+        const float a = (box.lower[axis] - origin[axis]) / direction[axis], b = (box.upper[axis] - origin[axis]) / direction[axis];
+        const float near = std::min(a, b), far = std::max(a, b);
+        enters = std::max(enters, near - std::abs(near) * rounding);
+        leaves = std::min(leaves, far + std::abs(far) * rounding);
+    }
+    if (!(enters <= leaves)) return;
+    keep_single(call, {.t = enters, .u = 0, .v = 0, .primitive = arguments->primID, .geometry = arguments->geomID, .instance = instance,
+                       .kind = ray_candidate_box | (is_opaque ? std::uint32_t{ray_candidate_opaque} : 0), .normal = {}});
+}
+
+/// Rays that only ask whether there is a hit pass through boxes; those that may meet some take another way.
+void ignore_box(const RTCOccludedFunctionNArguments*) {}
 
 /// Lanes as Embree takes them.
 struct alignas(64) ValidLanes {
@@ -252,6 +304,7 @@ bool next_candidate(RayQueryLanes& query, std::uint32_t lane) {
     query.candidate_primitive[lane] = candidate.primitive;
     query.candidate_geometry[lane] = candidate.geometry;
     query.candidate_instance[lane] = candidate.instance;
+    query.candidate_kind[lane] = candidate.kind;
     return true;
 }
 
@@ -272,8 +325,8 @@ void find_hits(const RayScene& scene, RayQueryLanes& query, std::uint32_t lanes,
 /// First traversal of lanes of one scene; returns those that may have candidates.
 std::uint32_t traverse(const RayScene& scene, RayQueryLanes& query, std::uint32_t lanes, std::uint32_t hints, float spread2) {
     const std::uint32_t flags_of_any = hints >> ray_flags_shift;
-    const bool has_candidates = scene.has_candidates(), has_overrides = scene.has_overrides();
-    if ((flags_of_any & (flags_against_packets | ray_skip_triangles)) == 0 &&
+    const bool has_candidates = scene.has_candidates(), has_overrides = scene.has_overrides(), has_boxes = scene.has_boxes();
+    if (!has_boxes && (flags_of_any & (flags_against_packets | ray_skip_triangles)) == 0 &&
         ((hints & ray_all_opaque) != 0 || (!has_candidates && !has_overrides))) {
         find_hits(scene, query, lanes, hints, spread2);
         return 0;
@@ -282,13 +335,14 @@ std::uint32_t traverse(const RayScene& scene, RayQueryLanes& query, std::uint32_
     for_each_lane(lanes, [&](std::uint32_t lane) {
         const std::uint32_t flags = query.flags[lane], bit = 1u << lane;
         query.candidate_count[lane] = query.next_candidate[lane] = query.has_more[lane] = 0;
-        if (flags & ray_skip_triangles) return;
-        if (flags & flags_against_packets) single |= bit;
+        const bool meets_boxes = has_boxes && (flags & ray_skip_boxes) == 0;
+        if ((flags & ray_skip_triangles) && !meets_boxes) return;
+        if (meets_boxes || (flags & flags_against_packets)) single |= bit;
         else if ((flags & ray_opaque) || (!has_candidates && !has_overrides)) at_once |= bit;
         else if (has_overrides || (hints & ray_one_by_one)) single |= bit;
         else collecting |= bit;
         // Only where some geometry, instance or ray asks for it are there lists to look into.
-        if ((flags & ray_no_opaque) || (has_candidates && (flags & ray_opaque) == 0)) asking |= bit;
+        if (meets_boxes || (flags & ray_no_opaque) || (has_candidates && (flags & ray_opaque) == 0)) asking |= bit;
     });
     if (at_once) find_hits(scene, query, at_once, hints, spread2);
     if (collecting) {
@@ -326,18 +380,33 @@ std::uint32_t proceed(RayQueryLanes* query_pointer, std::uint32_t fresh, std::ui
     return result;
 }
 
-void confirm(RayQueryLanes* query_pointer, std::uint32_t live) {
-    RayQueryLanes& query = *query_pointer;
+/// Takes the candidate of a lane as the committed hit.
+void commit(RayQueryLanes& query, std::uint32_t lane, float t, std::uint32_t kind) {
+    query.t[lane] = t;
+    query.u[lane] = query.candidate_u[lane], query.v[lane] = query.candidate_v[lane];
+    for (int axis = 0; axis < 3; ++axis) query.normal[axis][lane] = query.candidate_normal[axis][lane];
+    query.primitive[lane] = query.candidate_primitive[lane];
+    query.geometry[lane] = query.candidate_geometry[lane];
+    query.instance[lane] = query.candidate_instance[lane];
+    query.kind[lane] = kind;
+    if (query.flags[lane] & ray_terminate_on_first_hit) query.status[lane] = static_cast<std::uint32_t>(RayStatus::finished);
+}
+
+bool is_at(const RayQueryLanes& query, std::uint32_t lane, bool box) {
+    return query.status[lane] == static_cast<std::uint32_t>(RayStatus::waiting) &&
+           ((query.candidate_kind[lane] & ray_candidate_box) != 0) == box;
+}
+
+void confirm(RayQueryLanes* query, std::uint32_t live) {
     for_each_lane(live, [&](std::uint32_t lane) {
-        if (query.status[lane] != static_cast<std::uint32_t>(RayStatus::waiting)) return;
-        query.t[lane] = query.candidate_t[lane];
-        query.u[lane] = query.candidate_u[lane], query.v[lane] = query.candidate_v[lane];
-        for (int axis = 0; axis < 3; ++axis) query.normal[axis][lane] = query.candidate_normal[axis][lane];
-        query.primitive[lane] = query.candidate_primitive[lane];
-        query.geometry[lane] = query.candidate_geometry[lane];
-        query.instance[lane] = query.candidate_instance[lane];
-        query.kind[lane] = 1;
-        if (query.flags[lane] & ray_terminate_on_first_hit) query.status[lane] = static_cast<std::uint32_t>(RayStatus::finished);
+        if (is_at(*query, lane, false)) commit(*query, lane, query->candidate_t[lane], 1);
+    });
+}
+
+void generate(RayQueryLanes* query, std::uint32_t live, const float* t) {
+    for_each_lane(live, [&](std::uint32_t lane) {
+        // What lies beyond the ray is no hit of it.
+        if (is_at(*query, lane, true) && t[lane] >= query->t_min[lane] && t[lane] <= query->t[lane]) commit(*query, lane, t[lane], 2);
     });
 }
 
@@ -348,7 +417,15 @@ void set_candidate_filter(RTCGeometryTy* geometry) {
     rtcSetGeometryOccludedFilterFunction(geometry, collect);
 }
 
+void set_boxes(RTCGeometryTy* geometry, RayBoxes& boxes) {
+    rtcSetGeometryUserData(geometry, &boxes);
+    rtcSetGeometryBoundsFunction(geometry, bound_box, nullptr);
+    rtcSetGeometryIntersectFunction(geometry, meet_box);
+    rtcSetGeometryOccludedFunction(geometry, ignore_box);
+}
+
 RayProceedFunction ray_proceed_function() { return proceed; }
 RayConfirmFunction ray_confirm_function() { return confirm; }
+RayGenerateFunction ray_generate_function() { return generate; }
 
 }  // namespace nacre::cpu

@@ -176,17 +176,19 @@ class World {
         const Fence fence = ok(device_->submit(std::move(list)));
         ok(device_->wait(fence));
     }
-    std::vector<Hit> trace(const std::vector<ReferenceRay>& rays, const std::string& text = each_ray) {
+    std::vector<Hit> trace(const std::vector<ReferenceRay>& rays, const std::string& text = each_ray,
+                           const std::vector<BindGroupEntry>& more = {}) {
         ShaderCompiler compiler({});
         const Shader shader = ok(device_->create_shader(ok(compiler.compile({.path = "rays.comp", .text = "#version 460\n" + text}))));
         const ComputePipeline pipeline = ok(device_->create_compute_pipeline({.shader = shader, .name = "rays"}));
         const Buffer input = buffer_of(rays, BufferUsage::storage);
         const Buffer output = buffer_of(std::vector<Hit>(rays.size()), BufferUsage::storage);
-        const BindGroup group = ok(device_->create_bind_group({.layout = ok(device_->bind_group_layout(pipeline, 0)),
-                                                               .entries = {{.binding = 0, .acceleration_structure = top},
-                                                                           {.binding = 1, .buffer = input},
-                                                                           {.binding = 2, .buffer = output}},
-                                                               .name = "rays"}));
+        std::vector<BindGroupEntry> entries = more;
+        entries.push_back({.binding = 0, .acceleration_structure = top});
+        entries.push_back({.binding = 1, .buffer = input});
+        entries.push_back({.binding = 2, .buffer = output});
+        const BindGroup group = ok(device_->create_bind_group(
+            {.layout = ok(device_->bind_group_layout(pipeline, 0)), .entries = entries, .name = "rays"}));
         CommandList list = device_->create_command_list("trace");
         list.set_pipeline(pipeline);
         list.set_bind_group(0, group);
@@ -461,6 +463,213 @@ TEST_P(CpuRayQueries, RaysThatAreNoRaysHitNothingAndHarmNone) {
     const std::vector<Hit> endless_hits = world.trace(endless);
     for (ReferenceRay& ray : endless) ray.t_max = 1e9f;
     expect_agreement(scene, endless, endless_hits);
+}
+
+TEST_P(CpuRayQueries, CandidatesBeyondThoseThatAreKeptComeToo) {
+    // Panes one behind the other, of which each ray wants one, or none.
+    constexpr std::uint32_t panes = 50;
+    ReferenceScene scene;
+    ReferenceGeometry& geometry = scene.meshes.emplace_back().emplace_back();
+    geometry.opaque = false;
+    for (std::uint32_t i = 0; i < panes; ++i) {
+        const auto z = static_cast<float>(i + 1);
+        for (const auto& [x, y] : {std::pair(-9.0f, -9.0f), std::pair(20.0f, -9.0f), std::pair(-9.0f, 20.0f)}) geometry.vertices.push_back({x, y, z});
+        geometry.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    scene.instances.resize(1);
+    for (const bool in_place : {true, false}) {
+        if (!in_place) scene.instances[0].transform[11] = 1;
+        for (const std::uint32_t flags : {0x0u, 0x2u}) {
+            world.build(scene);
+            std::vector<ReferenceRay> rays(panes + 14);
+            for (std::size_t i = 0; i < rays.size(); ++i) {
+                const float x = 0.01f * static_cast<float>(i);
+                rays[i] = {.origin = {x, x, 0}, .direction = {0.1f, 0, 1}, .flags = flags};
+            }
+            const std::vector<Hit> hits = world.trace(rays, declarations.substr(0, declarations.find("// Candidates of")) + R"(
+                void main() {
+                    uint i = gl_GlobalInvocationID.x;
+                    if (i >= rays.length()) return;
+                    rayQueryEXT query;
+                    rayQueryInitializeEXT(query, scene, rays[i].flags.x, 0xff, rays[i].origin, 0, rays[i].direction, 1000);
+                    uvec2 candidates = uvec2(0);
+                    while (rayQueryProceedEXT(query)) {
+                        ++candidates.x;
+                        if (rayQueryGetIntersectionPrimitiveIndexEXT(query, false) == i) rayQueryConfirmIntersectionEXT(query);
+                    }
+                    store(i, query, candidates);
+                })");
+            for (std::uint32_t i = 0; i < hits.size(); ++i) {
+                ASSERT_EQ(hits[i].type, i < panes ? 1u : 0u) << "ray " << i << ", flags " << flags;
+                if (i >= panes) {
+                    ASSERT_EQ(hits[i].candidates, panes) << "ray " << i;
+                    continue;
+                }
+                ASSERT_EQ(hits[i].primitive, i);
+                ASSERT_FLOAT_EQ(hits[i].t, static_cast<float>(i + 1) + (in_place ? 0.0f : 1.0f));
+                // On the CPU backend by rising distance: none twice, none behind the one that was confirmed.
+                if (is_cpu()) ASSERT_EQ(hits[i].candidates, i + 1);
+            }
+        }
+    }
+}
+
+TEST_P(CpuRayQueries, SpheresInBoxesAgreeWithTheirEquation) {
+    constexpr std::uint32_t count = 30;  // Of each of two geometries, the first of them opaque.
+    struct Sphere {
+        std::array<float, 3> center;
+        float radius;
+    };
+    ReferenceScene scene = random_scene(40, 12);
+    scene.meshes.emplace_back().emplace_back();  // Place of the boxes.
+    for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+        scene.instances[i].flags = InstanceFlags::none;
+        if (i % 2 == 0) scene.instances[i].mesh = 3;
+    }
+    std::vector<Sphere> spheres;
+    std::uint32_t state = 5;
+    const auto next = [&] {
+        state = state * 1664525u + 1013904223u;
+        return static_cast<float>(state >> 8) * 0x1p-24f;
+    };
+    world.build(scene, true);
+    const AccelerationStructure boxes = World::ok(world.device().create_acceleration_structure(
+        {.geometries = {{.type = GeometryType::boxes, .opaque = true, .primitive_count = count, .vertex_stride = 24},
+                        {.type = GeometryType::boxes, .opaque = false, .primitive_count = count, .vertex_stride = 32}},
+         .allow_update = true}));
+    world.meshes[3] = boxes;
+    const std::string text = declarations.substr(0, declarations.find("// Candidates of")) + R"(
+        layout(set = 0, binding = 3) readonly buffer Spheres { vec4 spheres[]; };
+        void main() {
+            uint i = gl_GlobalInvocationID.x;
+            if (i >= rays.length()) return;
+            rayQueryEXT query;
+            rayQueryInitializeEXT(query, scene, rays[i].flags.x, rays[i].flags.y, rays[i].origin, rays[i].t_min, rays[i].direction,
+                                  rays[i].t_max);
+            uvec2 candidates = uvec2(0);
+            while (rayQueryProceedEXT(query)) {
+                ++candidates.x;
+                uint geometry = rayQueryGetIntersectionGeometryIndexEXT(query, false);
+                uint primitive = rayQueryGetIntersectionPrimitiveIndexEXT(query, false);
+                if (rayQueryGetIntersectionTypeEXT(query, false) != gl_RayQueryCandidateIntersectionAABBEXT) {
+                    if ((primitive + geometry + rayQueryGetIntersectionInstanceIdEXT(query, false) + i) % 3 != 0)
+                        rayQueryConfirmIntersectionEXT(query);
+                    continue;
+                }
+                if ((rays[i].flags.x & 3u) == 0u && rayQueryGetIntersectionCandidateAABBOpaqueEXT(query) != (geometry == 0)) ++candidates.y;
+                vec4 sphere = spheres[geometry * )" + std::to_string(count) + R"( + primitive];
+                vec3 o = rayQueryGetIntersectionObjectRayOriginEXT(query, false) - sphere.xyz;
+                vec3 d = rayQueryGetIntersectionObjectRayDirectionEXT(query, false);
+                float a = dot(d, d), b = dot(o, d);
+                vec3 foot = o - d * (b / a);
+                float below = sphere.w * sphere.w - dot(foot, foot);
+                if (below < 0) continue;
+                float half_chord = sqrt(below / a);
+                float limit = rays[i].t_max;
+                if (rayQueryGetIntersectionTypeEXT(query, true) != gl_RayQueryCommittedIntersectionNoneEXT)
+                    limit = rayQueryGetIntersectionTEXT(query, true);
+                float t = -b / a - half_chord;
+                if (t < rays[i].t_min) t = -b / a + half_chord;
+                if (t >= rays[i].t_min && t <= limit) rayQueryGenerateIntersectionEXT(query, t);
+            }
+            store(i, query, candidates);
+        })";
+    for (int frame = 0; frame < 2; ++frame) {
+        spheres.clear();
+        for (std::uint32_t i = 0; i < 2 * count; ++i)
+            spheres.push_back({{2 * next() - 1, 2 * next() - 1, 2 * next() - 1}, 0.05f + 0.2f * next()});
+        std::vector<float> first, second;
+        const float nan = std::numeric_limits<float>::quiet_NaN();
+        const auto is_broken = [&](std::uint32_t i) { return is_cpu() && i % 7 == 3; };
+        for (std::uint32_t i = 0; i < 2 * count; ++i) {
+            auto& to = i < count ? first : second;
+            const float side = is_broken(i) ? (i % 2 ? nan : -1) : spheres[i].radius * 1.001f;
+            for (const float sign : {-1.0f, 1.0f})
+                for (const float value : spheres[i].center) to.push_back(value + sign * side);
+            if (i >= count) to.insert(to.end(), 2, 77.0f);
+        }
+        const std::vector<GeometrySource> sources{{.vertices = world.buffer_of(first, BufferUsage::acceleration_structure_input)},
+                                                  {.vertices = world.buffer_of(second, BufferUsage::acceleration_structure_input)}};
+        CommandList list = world.device().create_command_list("boxes");
+        if (frame == 0) list.build_acceleration_structure(boxes, sources);
+        else list.update_acceleration_structure(boxes, sources);
+        list.build_acceleration_structure(world.top, world.instances_of(scene));
+        world.submit(std::move(list));
+
+        std::vector<ReferenceRay> rays = random_rays(1500, 41 + static_cast<std::uint32_t>(frame), false);
+        constexpr std::uint32_t flags[] = {0, 0, 0x1, 0x2, 0x40, 0x80, 0x100, 0x200, 0x4, 0x201, 0x102};
+        for (std::size_t i = 0; i < rays.size(); ++i) rays[i].flags = flags[i % std::size(flags)];
+        const std::vector<Hit> hits = world.trace(rays, text, {{.binding = 3, .buffer = world.buffer_of(spheres, BufferUsage::storage)}});
+        std::size_t compared = 0, of_spheres = 0, of_triangles = 0;
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            const ReferenceRay& ray = rays[i];
+            const ReferenceAnswer of_mesh = trace(scene, ray, [&](const ReferenceHit& hit) { return accepts(i, hit); });
+            double margin = of_mesh.margin, second_t = std::numeric_limits<double>::infinity();
+            ReferenceHit best = of_mesh.closest;
+            std::vector<std::pair<ReferenceHit, bool>> all;
+            for (const ReferenceHit& hit : of_mesh.hits) all.emplace_back(hit, false);
+            bool is_sphere = false;
+            for (std::size_t n = 0; n < scene.instances.size(); ++n) {
+                const ReferenceInstance& instance = scene.instances[n];
+                const auto inverse = inverse_of(instance.transform);
+                if (instance.mesh != 3 || !inverse || (instance.mask & ray.mask) == 0 || (ray.flags & 0x200)) continue;
+                double o[3], d[3];
+                for (std::size_t row = 0; row < 3; ++row) {
+                    const float* m = inverse->data() + row * 4;
+                    o[row] = double{m[3]}, d[row] = 0;
+                    for (std::size_t k = 0; k < 3; ++k) o[row] += double{m[k]} * ray.origin[k], d[row] += double{m[k]} * ray.direction[k];
+                }
+                for (std::uint32_t s = 0; s < 2 * count; ++s) {
+                    bool is_opaque = s < count;
+                    if (ray.flags & 1) is_opaque = true;
+                    if (ray.flags & 2) is_opaque = false;
+                    if (is_broken(s) || (ray.flags & (is_opaque ? 0x40u : 0x80u))) continue;
+                    double a = 0, b = 0, c = 0;
+                    for (std::size_t k = 0; k < 3; ++k) {
+                        const double from = o[k] - spheres[s].center[k];
+                        a += d[k] * d[k], b += from * d[k], c += from * from;
+                    }
+                    const double radius2 = double{spheres[s].radius} * spheres[s].radius, below = radius2 - (c - b * b / a);
+                    if (below > -0.2 * radius2) margin = std::min(margin, std::abs(below) / radius2 / 100);
+                    if (below < 0) continue;
+                    const double half_chord = std::sqrt(below / a);
+                    double t = -b / a - half_chord;
+                    for (const double root : {t, -b / a + half_chord}) {
+                        margin = std::min(margin, std::abs(root - ray.t_min) / 10);
+                        margin = std::min(margin, std::abs(root - ray.t_max) / 10);
+                    }
+                    if (t < ray.t_min) t = -b / a + half_chord;
+                    if (t < ray.t_min || t > ray.t_max) continue;
+                    ReferenceHit hit{.t = t, .instance = static_cast<std::uint32_t>(n), .geometry = s / count, .primitive = s % count};
+                    all.emplace_back(hit, true);
+                    second_t = std::min(second_t, std::max(t, best.t));
+                    if (t < best.t) best = hit, is_sphere = true;
+                }
+            }
+            ASSERT_EQ(hits[i].bad_candidates, 0u) << "ray " << i;
+            if (best.exists()) margin = std::min(margin, (second_t - best.t) / (1 + best.t));
+            if (margin < 1e-4) continue;
+            ++compared;
+            if (best.exists() && (ray.flags & 0x4)) {
+                bool is_one = false;
+                for (const auto& [hit, of_box] : all)
+                    is_one = is_one || (hits[i].type == (of_box ? 2u : 1u) && hits[i].instance == hit.instance &&
+                                        hits[i].geometry == hit.geometry && hits[i].primitive == hit.primitive);
+                ASSERT_TRUE(is_one) << "ray " << i;
+                continue;
+            }
+            ASSERT_EQ(hits[i].type, !best.exists() ? 0u : is_sphere ? 2u : 1u) << "ray " << i << ", flags " << ray.flags;
+            if (!best.exists()) continue;
+            ++(is_sphere ? of_spheres : of_triangles);
+            ASSERT_NEAR(hits[i].t, best.t, 1e-3 * (1 + best.t)) << "ray " << i;
+            ASSERT_EQ(hits[i].instance, best.instance) << "ray " << i;
+            ASSERT_EQ(hits[i].geometry, best.geometry) << "ray " << i;
+            ASSERT_EQ(hits[i].primitive, best.primitive) << "ray " << i;
+        }
+        EXPECT_GT(compared, rays.size() / 3);
+        EXPECT_GT(of_spheres, 50u);
+        EXPECT_GT(of_triangles, 20u);
+    }
 }
 
 TEST_P(CpuRayQueries, NothingIsHitWhereNothingIs) {
