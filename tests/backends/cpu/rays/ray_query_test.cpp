@@ -508,7 +508,9 @@ TEST_P(CpuRayQueries, CandidatesBeyondThoseThatAreKeptComeToo) {
                 ASSERT_EQ(hits[i].primitive, i);
                 ASSERT_FLOAT_EQ(hits[i].t, static_cast<float>(i + 1) + (in_place ? 0.0f : 1.0f));
                 // On the CPU backend by rising distance: none twice, none behind the one that was confirmed.
-                if (is_cpu()) ASSERT_EQ(hits[i].candidates, i + 1);
+                if (is_cpu()) {
+                    ASSERT_EQ(hits[i].candidates, i + 1);
+                }
             }
         }
     }
