@@ -6,7 +6,9 @@
 namespace nacre::rhi {
 
 std::optional<std::array<float, 12>> inverse_of(const std::array<float, 12>& transform) {
-    const auto m = [&](int row, int column) { return static_cast<double>(transform[static_cast<std::size_t>(row * 4 + column)]); };
+    const auto m = [&](int row, int column) {
+        return static_cast<double>(transform[static_cast<std::size_t>(row * 4 + column)]);
+    };
     double cofactors[3][3];
     for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 3; ++column) {

@@ -25,9 +25,9 @@ namespace nacre::rhi {
 
 enum class AccelerationStructureLevel : std::uint8_t { bottom, top };
 
-/// Kinds of geometry. A box is a place where a ray may hit something of the shader's own: it is always a candidate, which the shader
-/// answers with the distance of its hit (rayQueryGenerateIntersectionEXT). Curves have their place here; no device offers them yet,
-/// and asking for them is an error of code unsupported.
+/// Kinds of geometry. A box is a place where a ray may hit something of the shader's own: it is always a candidate,
+/// which the shader answers with the distance of its hit (rayQueryGenerateIntersectionEXT). Curves have their place
+/// here; no device offers them yet, and asking for them is an error of code unsupported.
 enum class GeometryType : std::uint8_t { triangles, boxes, curves };
 
 /// What a build spends its time for.
@@ -36,14 +36,14 @@ enum class BuildPreference : std::uint8_t { fast_trace, fast_build };
 /// Shape of one geometry of a bottom level; where its data lies is told when it is built.
 struct GeometryDesc {
     GeometryType type = GeometryType::triangles;
-    /// Hits count at once. Otherwise they are candidates that the shader confirms (alpha test), unless an instance or a ray
-    /// says otherwise. Of boxes: what rayQueryGetIntersectionCandidateAABBOpaqueEXT says.
+    /// Hits count at once. Otherwise they are candidates that the shader confirms (alpha test), unless an instance or a
+    /// ray says otherwise. Of boxes: what rayQueryGetIntersectionCandidateAABBOpaqueEXT says.
     bool opaque = true;
     std::uint32_t primitive_count = 0;                ///< Triangles or boxes; 0 is an empty geometry.
     Format vertex_format = Format::rgb32_float;       ///< The only one.
     std::uint32_t vertex_count = 0;                   ///< Of boxes 0.
-    /// Bytes from vertex to vertex: a multiple of 4, 12 to 65,536. Of boxes, which are six floats (least x, y, z, then largest), from
-    /// box to box: a multiple of 8, 24 to 65,536.
+    /// Bytes from vertex to vertex: a multiple of 4, 12 to 65,536. Of boxes, which are six floats (least x, y, z, then
+    /// largest), from box to box: a multiple of 8, 24 to 65,536.
     std::uint32_t vertex_stride = 12;
     std::optional<IndexType> index_type = {};         ///< Nothing: three vertices in a row make a triangle.
 };
@@ -70,7 +70,8 @@ struct GeometrySource {
 enum class InstanceFlags : std::uint32_t {
     none = 0,
     disable_culling = 1,  ///< Rays that cull by facing see both sides.
-    flip_facing = 2,      ///< Fronts become backs. The front of (a, b, c) is where cross(b - a, c - a) points to, in the object's space.
+    flip_facing = 2,  ///< Fronts become backs. The front of (a, b, c) is where cross(b - a, c - a) points to, in the
+                      ///< object's space.
     force_opaque = 4,
     force_no_opaque = 8,
 };
@@ -87,8 +88,9 @@ struct AccelerationStructureInstance {
     InstanceFlags flags = InstanceFlags::none;
 };
 
-/// World to object of an instance with this transform, three rows of four. Nothing where the instance is never hit: where its
-/// matrix has no inverse, or one with elements beyond `largest_inverse_element` or an offset beyond `largest_inverse_offset`.
+/// World to object of an instance with this transform, three rows of four. Nothing where the instance is never hit:
+/// where its matrix has no inverse, or one with elements beyond `largest_inverse_element` or an offset beyond
+/// `largest_inverse_offset`.
 std::optional<std::array<float, 12>> inverse_of(const std::array<float, 12>& transform);
 
 /// With rays up to 1e10 these keep every number in the space of an object far from the largest float.

@@ -23,7 +23,8 @@ Check CommandValidator::check_geometry_source(const char* attempted, const Accel
     const std::uint64_t element_bytes = is_boxes ? 24 : 12;
     const Part parts[] = {
         {is_boxes ? "box buffer" : "vertex buffer", source.vertices.handle, source.vertex_offset,
-         element_count == 0 ? 0 : std::uint64_t{element_count - 1} * geometry.vertex_stride + element_bytes, is_boxes ? 8u : 4u},
+         element_count == 0 ? 0 : std::uint64_t{element_count - 1} * geometry.vertex_stride + element_bytes,
+         is_boxes ? 8u : 4u},
         {"index buffer", source.indices.handle, source.index_offset,
          geometry.index_type ? std::uint64_t{geometry.primitive_count} * 3 * index_bytes : 0, index_bytes}};
     for (const Part& part : parts) {

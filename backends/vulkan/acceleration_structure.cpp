@@ -14,7 +14,8 @@ constexpr VkBufferUsageFlags addressed_input =
     VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
 
 // The flags of instances have the bits of Vulkan.
-static_assert(static_cast<int>(rhi::InstanceFlags::disable_culling) == VK_GEOMETRY_INSTANCE_TRIANGLE_FACING_CULL_DISABLE_BIT_KHR);
+static_assert(static_cast<int>(rhi::InstanceFlags::disable_culling) ==
+              VK_GEOMETRY_INSTANCE_TRIANGLE_FACING_CULL_DISABLE_BIT_KHR);
 static_assert(static_cast<int>(rhi::InstanceFlags::flip_facing) == VK_GEOMETRY_INSTANCE_TRIANGLE_FLIP_FACING_BIT_KHR);
 static_assert(static_cast<int>(rhi::InstanceFlags::force_opaque) == VK_GEOMETRY_INSTANCE_FORCE_OPAQUE_BIT_KHR);
 static_assert(static_cast<int>(rhi::InstanceFlags::force_no_opaque) == VK_GEOMETRY_INSTANCE_FORCE_NO_OPAQUE_BIT_KHR);
@@ -55,7 +56,8 @@ void AccelerationStructure::describe(const rhi::AccelerationStructureDesc& struc
         triangles.maxVertex = std::max(from.vertex_count, 1u) - 1;
         triangles.indexType = index_type_of(from);
     }
-    shape.info.type = is_top ? VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_KHR : VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_KHR;
+    shape.info.type =
+        is_top ? VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_KHR : VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_KHR;
     shape.info.flags = structure.prefer == rhi::BuildPreference::fast_build
                            ? VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_BUILD_BIT_KHR
                            : VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_KHR;
@@ -75,7 +77,8 @@ Expected<std::unique_ptr<rhi::BackendAccelerationStructure>> AccelerationStructu
                                                      &shape.info, shape.counts.data(), &sizes);
     made->build_scratch_bytes_ = sizes.buildScratchSize;
     made->update_scratch_bytes_ = sizes.updateScratchSize;
-    const rhi::BufferDesc storage{.size = std::max<std::uint64_t>(sizes.accelerationStructureSize, 1), .name = desc.name};
+    const rhi::BufferDesc storage{.size = std::max<std::uint64_t>(sizes.accelerationStructureSize, 1),
+                                  .name = desc.name};
     NACRE_TRY(made->storage_, Buffer::create(context, storage, VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_STORAGE_BIT_KHR));
     made->memory_bytes = made->storage_->memory_bytes;
     VkAccelerationStructureCreateInfoKHR info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_CREATE_INFO_KHR};
@@ -104,8 +107,9 @@ Expected<Buffer*> AccelerationStructure::keep_buffer(const char* purpose, std::u
     return &native(*kept.back());
 }
 
-Expected<VkDeviceAddress> AccelerationStructure::write_instances(const rhi::BuildAccelerationStructureCommand& command,
-                                                                 std::vector<std::unique_ptr<rhi::BackendBuffer>>& kept) const {
+Expected<VkDeviceAddress> AccelerationStructure::write_instances(
+    const rhi::BuildAccelerationStructureCommand& command,
+    std::vector<std::unique_ptr<rhi::BackendBuffer>>& kept) const {
     std::vector<VkAccelerationStructureInstanceKHR> instances(command.count);
     for (std::uint32_t i = 0; i < command.count; ++i) {
         const rhi::InstanceCommand& from = command.instances()[i];
@@ -130,12 +134,13 @@ Expected<VkDeviceAddress> AccelerationStructure::write_instances(const rhi::Buil
 Expected<void> AccelerationStructure::record_build(VkCommandBuffer commands,
                                                    const rhi::BuildAccelerationStructureCommand& command,
                                                    std::vector<std::unique_ptr<rhi::BackendBuffer>>& kept) {
-    // A top level is small, and which of its instances are active may change with each update, which Vulkan does not allow.
+    // A top level is small, and which of its instances are active may change with each update, which Vulkan does not
+    // allow.
     const bool is_update = command.is_update && !command.is_top;
     Shape shape;
     describe(desc, shape);
-    const std::uint64_t alignment =
-        std::max<std::uint64_t>(context_.physical->acceleration_structure.minAccelerationStructureScratchOffsetAlignment, 1);
+    const std::uint64_t alignment = std::max<std::uint64_t>(
+        context_.physical->acceleration_structure.minAccelerationStructureScratchOffsetAlignment, 1);
     const std::uint64_t scratch_bytes = is_update ? update_scratch_bytes_ : build_scratch_bytes_;
     NACRE_TRY(Buffer* const scratch, keep_buffer("scratch", scratch_bytes + alignment, rhi::MemoryKind::device,
                                                  VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | addressed_input, kept));
@@ -162,7 +167,8 @@ Expected<void> AccelerationStructure::record_build(VkCommandBuffer commands,
                 triangles.indexData.deviceAddress = address(source.indices, source.index_offset);
         }
     }
-    shape.info.mode = is_update ? VK_BUILD_ACCELERATION_STRUCTURE_MODE_UPDATE_KHR : VK_BUILD_ACCELERATION_STRUCTURE_MODE_BUILD_KHR;
+    shape.info.mode =
+        is_update ? VK_BUILD_ACCELERATION_STRUCTURE_MODE_UPDATE_KHR : VK_BUILD_ACCELERATION_STRUCTURE_MODE_BUILD_KHR;
     shape.info.srcAccelerationStructure = is_update ? handle : VK_NULL_HANDLE;
     shape.info.dstAccelerationStructure = handle;
     shape.info.scratchData.deviceAddress = (scratch_address + alignment - 1) / alignment * alignment;

@@ -11,8 +11,8 @@ namespace nacre::vulkan {
 class AccelerationStructure final : public rhi::BackendAccelerationStructure {
   public:
     /// Errors: out_of_memory.
-    static Expected<std::unique_ptr<rhi::BackendAccelerationStructure>> create(Context& context,
-                                                                               const rhi::AccelerationStructureDesc& desc);
+    static Expected<std::unique_ptr<rhi::BackendAccelerationStructure>> create(
+        Context& context, const rhi::AccelerationStructureDesc& desc);
     ~AccelerationStructure() override;
 
     /// Records a build or an update. What it needs until the device has finished with it is added to `kept`.
@@ -27,12 +27,14 @@ class AccelerationStructure final : public rhi::BackendAccelerationStructure {
     struct Shape {
         std::vector<VkAccelerationStructureGeometryKHR> geometries;
         std::vector<std::uint32_t> counts;
-        VkAccelerationStructureBuildGeometryInfoKHR info{VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_BUILD_GEOMETRY_INFO_KHR};
+        VkAccelerationStructureBuildGeometryInfoKHR info{
+            VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_BUILD_GEOMETRY_INFO_KHR};
     };
 
     explicit AccelerationStructure(Context& context) : context_(context) {}
     void describe(const rhi::AccelerationStructureDesc& structure, Shape& shape) const;
-    Expected<Buffer*> keep_buffer(const char* purpose, std::uint64_t bytes, rhi::MemoryKind kind, VkBufferUsageFlags usage,
+    Expected<Buffer*> keep_buffer(const char* purpose, std::uint64_t bytes, rhi::MemoryKind kind,
+                                  VkBufferUsageFlags usage,
                                   std::vector<std::unique_ptr<rhi::BackendBuffer>>& kept) const;
     Expected<VkDeviceAddress> write_instances(const rhi::BuildAccelerationStructureCommand& command,
                                               std::vector<std::unique_ptr<rhi::BackendBuffer>>& kept) const;

@@ -6,7 +6,7 @@
 namespace nacre::vulkan {
 
 Expected<std::unique_ptr<rhi::BackendBuffer>> Buffer::create(Context& context, const rhi::BufferDesc& desc,
-                                                              VkBufferUsageFlags usage) {
+                                                             VkBufferUsageFlags usage) {
     std::unique_ptr<Buffer> buffer(new Buffer(context));
     buffer->desc = desc;
     VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};

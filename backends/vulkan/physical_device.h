@@ -65,7 +65,7 @@ class PhysicalDevice {
     bool has_synchronization2 = false;
     bool has_robustness2 = false;
     bool has_line_rasterization = false;
-    bool has_ray_query = false;              ///< With all that acceleration structures need.
+    bool has_ray_query = false;  ///< With all that acceleration structures need.
 
   private:
     std::vector<VkExtensionProperties> extensions_;

@@ -13,10 +13,10 @@
 #include "benchmarks/cpu/bench.h"
 
 /// @file
-/// Ray queries of a compute shader, against a bare loop over the call of Embree that is fastest for the rays: packets of 16 with
-/// the right hint of coherence, without instances. The loop has its rays in packets already, and both sides write a distance and a
-/// triangle for each ray. "embree" traces a scene as Embree makes it by default, whose rays may slip through shared edges;
-/// "embree_robust" one without that fault, as the backend's are.
+/// Ray queries of a compute shader, against a bare loop over the call of Embree that is fastest for the rays: packets
+/// of 16 with the right hint of coherence, without instances. The loop has its rays in packets already, and both sides
+/// write a distance and a triangle for each ray. "embree" traces a scene as Embree makes it by default, whose rays may
+/// slip through shared edges; "embree_robust" one without that fault, as the backend's are.
 
 namespace nacre::bench {
 namespace {
@@ -46,7 +46,8 @@ Mesh make_mesh() {
     for (std::uint32_t y = 0; y <= cells; ++y)
         for (std::uint32_t x = 0; x <= cells; ++x) {
             const double u = 2 * std::numbers::pi * x / cells, v = std::numbers::pi * y / cells;
-            const double radius = 1 + 0.1 * std::sin(7 * u) * std::sin(5 * v) + 0.03 * std::sin(31 * u + 3) * std::sin(37 * v);
+            const double radius =
+                1 + 0.1 * std::sin(7 * u) * std::sin(5 * v) + 0.03 * std::sin(31 * u + 3) * std::sin(37 * v);
             mesh.positions.push_back(static_cast<float>(radius * std::sin(v) * std::cos(u)));
             mesh.positions.push_back(static_cast<float>(radius * std::cos(v)));
             mesh.positions.push_back(static_cast<float>(radius * std::sin(v) * std::sin(u)));
@@ -54,7 +55,8 @@ Mesh make_mesh() {
     for (std::uint32_t y = 0; y < cells; ++y)
         for (std::uint32_t x = 0; x < cells; ++x) {
             const std::uint32_t corner = y * (cells + 1) + x;
-            for (const std::uint32_t vertex : {corner, corner + 1, corner + cells + 1, corner + 1, corner + cells + 2, corner + cells + 1})
+            for (const std::uint32_t vertex :
+                 {corner, corner + 1, corner + cells + 1, corner + 1, corner + cells + 2, corner + cells + 1})
                 mesh.indices.push_back(vertex);
         }
     return mesh;
@@ -67,7 +69,8 @@ std::vector<Ray> incoherent_rays() {
     std::vector<Ray> rays(1 << 20);
     for (Ray& ray : rays) {
         for (float& value : ray.origin) value = 2 * unit(random) - 1;
-        const float z = 2 * unit(random) - 1, angle = 2 * std::numbers::pi_v<float> * unit(random), r = std::sqrt(1 - z * z);
+        const float z = 2 * unit(random) - 1, angle = 2 * std::numbers::pi_v<float> * unit(random),
+                    r = std::sqrt(1 - z * z);
         ray = {ray.origin, 0, {r * std::cos(angle), r * std::sin(angle), z}, 1e9f};
     }
     return rays;
@@ -83,7 +86,8 @@ std::vector<Ray> primary_rays() {
                 const auto px = static_cast<float>(x + i % 4) + 0.5f, py = static_cast<float>(y + i / 4) + 0.5f;
                 rays.push_back({{0, 0, -3},
                                 0,
-                                {(px - picture_width / 2.0f) / picture_height, (picture_height / 2.0f - py) / picture_height, 1.3f},
+                                {(px - picture_width / 2.0f) / picture_height,
+                                 (picture_height / 2.0f - py) / picture_height, 1.3f},
                                 1e9f});
             }
     return rays;
@@ -106,17 +110,20 @@ struct Traced {
         };
         NACRE_TRY(const rhi::Buffer positions, upload(mesh.positions, "positions"));
         NACRE_TRY(const rhi::Buffer indices, upload(mesh.indices, "indices"));
-        NACRE_TRY(made.bottom, device.create_acceleration_structure(
-            {.level = rhi::AccelerationStructureLevel::bottom,
-             .geometries = {{.primitive_count = static_cast<std::uint32_t>(mesh.indices.size() / 3),
-                             .vertex_count = static_cast<std::uint32_t>(mesh.positions.size() / 3),
-                             .index_type = rhi::IndexType::uint32}},
-             .name = "mesh"}));
+        NACRE_TRY(made.bottom,
+                  device.create_acceleration_structure(
+                      {.level = rhi::AccelerationStructureLevel::bottom,
+                       .geometries = {{.primitive_count = static_cast<std::uint32_t>(mesh.indices.size() / 3),
+                                       .vertex_count = static_cast<std::uint32_t>(mesh.positions.size() / 3),
+                                       .index_type = rhi::IndexType::uint32}},
+                       .name = "mesh"}));
         NACRE_TRY(made.top, device.create_acceleration_structure(
-            {.level = rhi::AccelerationStructureLevel::top, .max_instances = 1, .name = "scene"}));
+                                {.level = rhi::AccelerationStructureLevel::top, .max_instances = 1, .name = "scene"}));
         NACRE_CHECK(time_submission(device, [&](rhi::CommandList& list) {
-            list.build_acceleration_structure(made.bottom, std::array{rhi::GeometrySource{.vertices = positions, .indices = indices}});
-            list.build_acceleration_structure(made.top, std::array{rhi::AccelerationStructureInstance{.bottom_level = made.bottom}});
+            list.build_acceleration_structure(
+                made.bottom, std::array{rhi::GeometrySource{.vertices = positions, .indices = indices}});
+            list.build_acceleration_structure(
+                made.top, std::array{rhi::AccelerationStructureInstance{.bottom_level = made.bottom}});
         }));
         device.destroy(positions);
         device.destroy(indices);
@@ -133,13 +140,13 @@ struct Query {
 
     static Expected<Query> make(const Traced& traced, const std::string& shader, const std::vector<Ray>& rays) {
         Query made{.device = traced.device, .count = static_cast<std::uint32_t>(rays.size())};
-        NACRE_TRY(const rhi::Buffer input, made.device->create_buffer({.size = rays.size() * sizeof(Ray),
-                                                                       .usage = rhi::BufferUsage::storage,
-                                                                       .name = "rays"}));
+        NACRE_TRY(const rhi::Buffer input,
+                  made.device->create_buffer(
+                      {.size = rays.size() * sizeof(Ray), .usage = rhi::BufferUsage::storage, .name = "rays"}));
         NACRE_CHECK(made.device->write_buffer(input, std::as_bytes(std::span(rays))));
-        NACRE_TRY(made.hits, made.device->create_buffer({.size = rays.size() * sizeof(Hit),
-                                                         .usage = rhi::BufferUsage::storage,
-                                                         .name = "hits"}));
+        NACRE_TRY(made.hits,
+                  made.device->create_buffer(
+                      {.size = rays.size() * sizeof(Hit), .usage = rhi::BufferUsage::storage, .name = "hits"}));
         NACRE_TRY(made.kernel, make_kernel(*made.device, shader,
                                            {{.binding = 0, .acceleration_structure = traced.top},
                                             {.binding = 1, .buffer = input},
@@ -171,10 +178,12 @@ class Bare {
         scene_ = rtcNewScene(device);
         rtcSetSceneFlags(scene_, flags);
         RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-        std::memcpy(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size() / 3),
+        std::memcpy(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12,
+                                            mesh.positions.size() / 3),
                     mesh.positions.data(), mesh.positions.size() * 4);
-        std::memcpy(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.indices.size() / 3),
-                    mesh.indices.data(), mesh.indices.size() * 4);
+        std::memcpy(
+            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.indices.size() / 3),
+            mesh.indices.data(), mesh.indices.size() * 4);
         rtcCommitGeometry(geometry);
         rtcAttachGeometry(scene_, geometry);
         rtcReleaseGeometry(geometry);
@@ -192,7 +201,8 @@ class Bare {
             RTCRay16& to = packets_[i / packet];
             const std::size_t lane = i % packet;
             to.org_x[lane] = rays[i].origin[0], to.org_y[lane] = rays[i].origin[1], to.org_z[lane] = rays[i].origin[2];
-            to.dir_x[lane] = rays[i].direction[0], to.dir_y[lane] = rays[i].direction[1], to.dir_z[lane] = rays[i].direction[2];
+            to.dir_x[lane] = rays[i].direction[0], to.dir_y[lane] = rays[i].direction[1],
+            to.dir_z[lane] = rays[i].direction[2];
             to.tnear[lane] = rays[i].t_min, to.tfar[lane] = rays[i].t_max;
             to.mask[lane] = ~0u;
         }
@@ -204,7 +214,8 @@ class Bare {
             scheduler_->run(tasks, [&](std::uint32_t index, std::uint32_t) {
                 RTCIntersectContext context;
                 rtcInitIntersectContext(&context);
-                context.flags = is_coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+                context.flags =
+                    is_coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
                 alignas(64) int valid[packet];
                 std::ranges::fill(valid, -1);
                 const std::size_t end = std::min(packets_.size(), (index + 1) * share);
@@ -214,13 +225,15 @@ class Bare {
                     rays.ray = packets_[i];
                     if (question == Question::whether_hit) {
                         rtcOccluded16(valid, scene_, &context, &rays.ray);
-                        for (std::size_t lane = 0; lane < packet; ++lane) to[lane] = {0, rays.ray.tfar[lane] < 0 ? 0 : ~0u};
+                        for (std::size_t lane = 0; lane < packet; ++lane)
+                            to[lane] = {0, rays.ray.tfar[lane] < 0 ? 0 : ~0u};
                         continue;
                     }
                     std::ranges::fill(rays.hit.geomID, RTC_INVALID_GEOMETRY_ID);
                     std::ranges::fill(rays.hit.primID, RTC_INVALID_GEOMETRY_ID);
                     rtcIntersect16(valid, scene_, &context, &rays);
-                    for (std::size_t lane = 0; lane < packet; ++lane) to[lane] = {rays.ray.tfar[lane], rays.hit.primID[lane]};
+                    for (std::size_t lane = 0; lane < packet; ++lane)
+                        to[lane] = {rays.ray.tfar[lane], rays.hit.primID[lane]};
                 }
             });
             return {};
@@ -235,8 +248,8 @@ class Bare {
     std::vector<Hit> hits_;
 };
 
-Expected<void> run_case(Bench& bench, const std::string& name, double target, const Mesh& mesh, const std::vector<Ray>& rays,
-                        Question question, bool is_coherent) {
+Expected<void> run_case(Bench& bench, const std::string& name, double target, const Mesh& mesh,
+                        const std::vector<Ray>& rays, Question question, bool is_coherent) {
     if (!bench.wants(name)) return {};
     Case work{.name = name, .target = target};
     std::vector<Query> queries;
@@ -244,15 +257,20 @@ Expected<void> run_case(Bench& bench, const std::string& name, double target, co
     for (const std::uint32_t lanes : bench.lane_counts()) {
         NACRE_TRY(rhi::Device* const device, bench.device(cpu_spec(lanes)));
         NACRE_TRY(traced.emplace_back(), Traced::make(*device, mesh));
-        NACRE_TRY(const Query query, Query::make(traced.back(), question == Question::whether_hit ? "benchmarks/cpu/rays_occlusion.comp"
-                                                                                                 : "benchmarks/cpu/rays.comp", rays));
+        NACRE_TRY(const Query query,
+                  Query::make(traced.back(),
+                              question == Question::whether_hit ? "benchmarks/cpu/rays_occlusion.comp"
+                                                                : "benchmarks/cpu/rays.comp",
+                              rays));
         queries.push_back(query);
         work.cpu.push_back({.name = "cpu", .lanes = lanes, .run = [query] { return query.run(); }});
     }
-    const auto bare = std::make_shared<Bare>(mesh, RTC_SCENE_FLAG_NONE), robust = std::make_shared<Bare>(mesh, RTC_SCENE_FLAG_ROBUST);
+    const auto bare = std::make_shared<Bare>(mesh, RTC_SCENE_FLAG_NONE),
+               robust = std::make_shared<Bare>(mesh, RTC_SCENE_FLAG_ROBUST);
     for (const auto& [reference, label] : {std::pair(bare, "embree"), std::pair(robust, "embree_robust")}) {
         reference->take(rays);
-        work.references.push_back({.name = label, .run = [=]() -> Expected<double> { return reference->run(question, is_coherent); }});
+        work.references.push_back(
+            {.name = label, .run = [=]() -> Expected<double> { return reference->run(question, is_coherent); }});
     }
     NACRE_CHECK(bench.measure(std::move(work)));
     for (const Query& query : queries) {

@@ -138,9 +138,12 @@ std::vector<Component> Emitter::ray_property(Id pointer, std::uint32_t property,
 
 llvm::Value* Emitter::status_row(RayStatus status) { return splat(int32(static_cast<std::int32_t>(status))); }
 
-llvm::Value* Emitter::traceable(const Value& origin, const Value& direction, const Component& t_min, const Component& t_max) {
+llvm::Value* Emitter::traceable(const Value& origin, const Value& direction, const Component& t_min,
+                                const Component& t_max) {
     // Bits of floats that are not negative rise as they do, and those of what is no number lie above all others.
-    const auto bits = [&](const Component& component) { return builder.CreateBitCast(widen(component), vector_of(builder.getInt32Ty())); };
+    const auto bits = [&](const Component& component) {
+        return builder.CreateBitCast(widen(component), vector_of(builder.getInt32Ty()));
+    };
     const auto without_sign = [&](llvm::Value* value) { return builder.CreateAnd(value, splat(int32(0x7fffffff))); };
     llvm::Value* largest = splat(int32(std::bit_cast<std::int32_t>(largest_ray_coordinate)));
     llvm::Value* infinity = splat(int32(0x7f800000));
@@ -148,7 +151,8 @@ llvm::Value* Emitter::traceable(const Value& origin, const Value& direction, con
     llvm::Value* end = bits(t_max);
     llvm::Value* result = builder.CreateAnd(builder.CreateICmpULE(begin, end), builder.CreateICmpULE(end, infinity));
     // Zero may have a sign.
-    result = builder.CreateAnd(result, builder.CreateICmpSGE(builder.CreateSub(bits(t_min), splat(int32(1))), splat(int32(-1))));
+    result = builder.CreateAnd(
+        result, builder.CreateICmpSGE(builder.CreateSub(bits(t_min), splat(int32(1))), splat(int32(-1))));
     for (const Value* vector : {&origin, &direction})
         for (const Component& component : vector->components)
             result = builder.CreateAnd(result, builder.CreateICmpULE(without_sign(bits(component)), largest));
@@ -159,7 +163,8 @@ llvm::Value* Emitter::proceed_hints(llvm::Value* query, llvm::Value* fresh, llvm
     llvm::Type* word = builder.getInt32Ty();
     llvm::Type* real = builder.getFloatTy();
     const auto row_at = [&](std::size_t offset, llvm::Type* scalar) {
-        return builder.CreateAlignedLoad(vector_of(scalar), at_offset(query, static_cast<std::int64_t>(offset)), llvm::Align(64));
+        return builder.CreateAlignedLoad(vector_of(scalar), at_offset(query, static_cast<std::int64_t>(offset)),
+                                         llvm::Align(64));
     };
     llvm::Value* first = builder.CreateZExt(first_lane(fresh), builder.getInt64Ty());
     const auto first_of = [&](std::size_t offset, llvm::Type* scalar) {
@@ -167,7 +172,8 @@ llvm::Value* Emitter::proceed_hints(llvm::Value* query, llvm::Value* fresh, llvm
         return splat(builder.CreateLoad(scalar, builder.CreateGEP(scalar, row, first)));
     };
     const auto holds = [&](llvm::Value* condition) {
-        return builder.CreateNot(any(select(fresh, builder.CreateNot(condition), llvm::Constant::getNullValue(mask_type))));
+        return builder.CreateNot(
+            any(select(fresh, builder.CreateNot(condition), llvm::Constant::getNullValue(mask_type))));
     };
     const auto hint = [&](llvm::Value* condition, RayHints bit) {
         return builder.CreateSelect(condition, int32(bit), int32(0));
@@ -185,15 +191,20 @@ llvm::Value* Emitter::proceed_hints(llvm::Value* query, llvm::Value* fresh, llvm
         llvm::Value* flags_row = row_at(offsetof(RayQueryLanes, flags), word);
         llvm::Value* none = llvm::Constant::getNullValue(vector_of(word));
         llvm::Value* of_any = builder.CreateOrReduce(select(fresh, flags_row, none));
-        llvm::Value* of_all = builder.CreateAndReduce(select(fresh, flags_row, llvm::Constant::getAllOnesValue(vector_of(word))));
-        const auto is_set = [&](RayFlags flag) { return builder.CreateICmpNE(builder.CreateAnd(of_all, int32(flag)), int32(0)); };
-        hints = builder.CreateOr(int32(static_cast<std::int32_t>(known)), builder.CreateShl(of_any, int32(ray_flags_shift)));
+        llvm::Value* of_all =
+            builder.CreateAndReduce(select(fresh, flags_row, llvm::Constant::getAllOnesValue(vector_of(word))));
+        const auto is_set = [&](RayFlags flag) {
+            return builder.CreateICmpNE(builder.CreateAnd(of_all, int32(flag)), int32(0));
+        };
+        hints = builder.CreateOr(int32(static_cast<std::int32_t>(known)),
+                                 builder.CreateShl(of_any, int32(ray_flags_shift)));
         hints = builder.CreateOr(hints, hint(is_set(ray_opaque), ray_all_opaque));
         hints = builder.CreateOr(hints, hint(is_set(ray_terminate_on_first_hit), ray_all_terminate));
     }
     llvm::Type* wide = builder.getInt64Ty();
     hints = builder.CreateOr(hints, hint(holds(builder.CreateICmpEQ(row_at(offsetof(RayQueryLanes, scene), wide),
-                                                                    first_of(offsetof(RayQueryLanes, scene), wide))), ray_one_scene));
+                                                                    first_of(offsetof(RayQueryLanes, scene), wide))),
+                                         ray_one_scene));
 
     // Squares throughout: of lengths, cosines and distances.
     llvm::Value* dot = nullptr;
@@ -217,8 +228,9 @@ llvm::Value* Emitter::proceed_hints(llvm::Value* query, llvm::Value* fresh, llvm
     }
     llvm::Value* limit = builder.CreateFMul(builder.CreateFMul(length2, first_length2),
                                             splat(llvm::ConstantFP::get(real, smallest_similar_cosine2)));
-    llvm::Value* is_similar = builder.CreateAnd(builder.CreateFCmpOGT(dot, llvm::Constant::getNullValue(vector_of(real))),
-                                                builder.CreateFCmpOGE(builder.CreateFMul(dot, dot), limit));
+    llvm::Value* is_similar =
+        builder.CreateAnd(builder.CreateFCmpOGT(dot, llvm::Constant::getNullValue(vector_of(real))),
+                          builder.CreateFCmpOGE(builder.CreateFMul(dot, dot), limit));
     hints = builder.CreateOr(hints, hint(holds(is_similar), ray_similar_directions));
     spread2 = builder.CreateFPMaxReduce(select(fresh, distance2, llvm::Constant::getNullValue(vector_of(real))));
     return hints;
@@ -226,7 +238,8 @@ llvm::Value* Emitter::proceed_hints(llvm::Value* query, llvm::Value* fresh, llvm
 
 void Emitter::proceed_query(const Instruction& at) {
     llvm::Type* word = builder.getInt32Ty();
-    llvm::FunctionCallee function = external("nacre_cpu_ray_proceed", word, {pointer_type, word, word, word, builder.getFloatTy()});
+    llvm::FunctionCallee function =
+        external("nacre_cpu_ray_proceed", word, {pointer_type, word, word, word, builder.getFloatTy()});
     llvm::AllocaInst* bits = make_slot(word, "candidates");
     builder.CreateStore(int32(0), bits);
     for_each_query(at.operand(0), [&](llvm::Value* query, llvm::Value* lanes_on) {
@@ -241,8 +254,10 @@ void Emitter::proceed_query(const Instruction& at) {
         builder.SetInsertPoint(proceeds);
         llvm::Value* spread2 = nullptr;
         llvm::Value* hints = proceed_hints(query, fresh, spread2);
-        llvm::Value* found = builder.CreateCall(function, {query, mask_bits(fresh), mask_bits(waiting), hints, spread2});
-        llvm::Value* is_waiting = builder.CreateBitCast(builder.CreateZExtOrTrunc(found, builder.getIntNTy(lanes)), mask_type);
+        llvm::Value* found =
+            builder.CreateCall(function, {query, mask_bits(fresh), mask_bits(waiting), hints, spread2});
+        llvm::Value* is_waiting =
+            builder.CreateBitCast(builder.CreateZExtOrTrunc(found, builder.getIntNTy(lanes)), mask_type);
         llvm::Value* next = select(is_waiting, status_row(RayStatus::waiting), status_row(RayStatus::finished));
         builder.CreateAlignedStore(select(active, next, status), status_address, llvm::Align(64));
         builder.CreateStore(builder.CreateOr(builder.CreateLoad(word, bits), found), bits);
@@ -303,7 +318,8 @@ bool Emitter::emit_ray(const Instruction& at) {
                 row(offsetof(RayQueryLanes, time), zero_row);
                 // A ray that cannot be traced ends where it begins, with its query.
                 llvm::Value* is_traceable = traceable(origin, direction, t_min, t_max);
-                row(offsetof(RayQueryLanes, t), select(is_traceable, widen(t_max), llvm::Constant::getNullValue(vector_of(real))));
+                row(offsetof(RayQueryLanes, t),
+                    select(is_traceable, widen(t_max), llvm::Constant::getNullValue(vector_of(real))));
                 row(offsetof(RayQueryLanes, cull_mask), builder.CreateAnd(widen(cull_mask), splat(int32(0xff))));
                 row(offsetof(RayQueryLanes, id), lane_numbers());
                 row(offsetof(RayQueryLanes, reserved), zero_row);
@@ -312,7 +328,8 @@ bool Emitter::emit_ray(const Instruction& at) {
                 row(offsetof(RayQueryLanes, instance), none_row);
                 row(offsetof(RayQueryLanes, scene), scenes);
                 row(offsetof(RayQueryLanes, flags), widen(flags));
-                row(offsetof(RayQueryLanes, status), select(is_traceable, status_row(RayStatus::ready), status_row(RayStatus::finished)));
+                row(offsetof(RayQueryLanes, status),
+                    select(is_traceable, status_row(RayStatus::ready), status_row(RayStatus::finished)));
                 row(offsetof(RayQueryLanes, kind), splat(int32(1)));
             });
             return true;
@@ -331,7 +348,8 @@ bool Emitter::emit_ray(const Instruction& at) {
             return true;
         }
         case Op::OpRayQueryGenerateIntersectionKHR: {
-            llvm::FunctionCallee function = external("nacre_cpu_ray_generate", builder.getVoidTy(), {pointer_type, word, pointer_type});
+            llvm::FunctionCallee function =
+                external("nacre_cpu_ray_generate", builder.getVoidTy(), {pointer_type, word, pointer_type});
             llvm::AllocaInst* distances = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), row_bytes), "distances");
             builder.CreateAlignedStore(widen(get_scalar(at.operand(1))), distances, llvm::Align(64));
             for_each_query(at.operand(0), [&](llvm::Value* query, llvm::Value* lanes_on) {
@@ -384,8 +402,9 @@ bool Emitter::emit_ray(const Instruction& at) {
         case Op::OpRayQueryGetIntersectionObjectToWorldKHR: return get_property(RayProperty::object_to_world, 12, real);
         case Op::OpRayQueryGetIntersectionWorldToObjectKHR: return get_property(RayProperty::world_to_object, 12, real);
         case Op::OpRayQueryGetIntersectionCandidateAABBOpaqueKHR:
-            set(at, {Component(builder.CreateICmpNE(builder.CreateAnd(candidate_kind(), splat(int32(ray_candidate_opaque))),
-                                                    llvm::Constant::getNullValue(vector_of(word))))});
+            set(at,
+                {Component(builder.CreateICmpNE(builder.CreateAnd(candidate_kind(), splat(int32(ray_candidate_opaque))),
+                                                llvm::Constant::getNullValue(vector_of(word))))});
             return true;
         case Op::OpRayQueryGetRayTMinKHR: {
             const std::size_t offset = offsetof(RayQueryLanes, t_min);

@@ -31,9 +31,9 @@ enum RayFlags : std::uint32_t {
 
 /// What a query of one lane is about to do.
 enum class RayStatus : std::uint32_t {
-    none,      ///< Never initialized: there is nothing to hit.
-    ready,     ///< Initialized with a ray that can be traced; the first Proceed traverses.
-    waiting,   ///< At a candidate; more may follow.
+    none,     ///< Never initialized: there is nothing to hit.
+    ready,    ///< Initialized with a ray that can be traced; the first Proceed traverses.
+    waiting,  ///< At a candidate; more may follow.
     finished,
 };
 
@@ -45,7 +45,7 @@ enum RayCandidateKind : std::uint32_t {
 
 /// A hit that the shader has to judge.
 struct RayCandidate {
-    float t;     ///< Where the ray enters a box; its hit is not known.
+    float t;  ///< Where the ray enters a box; its hit is not known.
     float u, v;
     std::uint32_t primitive, geometry, instance;
     std::uint32_t kind;  ///< RayCandidateKind
@@ -100,8 +100,8 @@ enum class RayProperty : std::uint32_t {
 inline constexpr std::uint32_t most_property_words = 12;
 inline constexpr std::uint32_t ray_property_committed = 256;  ///< Added to a RayProperty: of the committed hit, not the candidate.
 
-/// What compiled code knows of the lanes that begin, for `RayProceedFunction`. Flags of any of their rays are added, from the bit
-/// `ray_flags_shift` on.
+/// What compiled code knows of the lanes that begin, for `RayProceedFunction`. Flags of any of their rays are added,
+/// from the bit `ray_flags_shift` on.
 enum RayHints : std::uint32_t {
     ray_only_whether_hit = 1,    ///< Nothing but its type is asked of committed hits.
     ray_similar_directions = 2,  ///< Of all rays; their origins must be near each other, too, to make them coherent.
@@ -112,20 +112,21 @@ enum RayHints : std::uint32_t {
 };
 inline constexpr std::uint32_t ray_flags_shift = 16;
 
-/// Directions are similar where the square of the cosine between each and the first is at least this: within 6 degrees. With wider
-/// packets one walk for all rays is slower than Embree's other way (measured with triangles of 1/400 of the scene's size).
+/// Directions are similar where the square of the cosine between each and the first is at least this: within 6 degrees.
+/// With wider packets one walk for all rays is slower than Embree's other way (measured with triangles of 1/400 of the
+/// scene's size).
 inline constexpr float smallest_similar_cosine2 = 0.99f;
 
-/// Rays have coordinates up to this, so that Embree, which takes numbers below 1.8e18, gets none larger in the space of any
-/// instance. Compiled code never makes a lane ready whose ray goes beyond, or has a negative or unordered interval: Embree stops
-/// the program at some of these.
+/// Rays have coordinates up to this, so that Embree, which takes numbers below 1.8e18, gets none larger in the space of
+/// any instance. Compiled code never makes a lane ready whose ray goes beyond, or has a negative or unordered interval:
+/// Embree stops the program at some of these.
 inline constexpr float largest_ray_coordinate = 1e10f;
 
-/// Does what rayQueryProceedEXT does in the lanes of `fresh`, which are ready, and those of `waiting`; returns those that stand at
-/// a candidate now. The caller writes the status.
+/// Does what rayQueryProceedEXT does in the lanes of `fresh`, which are ready, and those of `waiting`; returns those
+/// that stand at a candidate now. The caller writes the status.
 /// @param spread2  square of the largest distance between the origin of the first lane of `fresh` and another
-using RayProceedFunction = std::uint32_t (*)(RayQueryLanes* query, std::uint32_t fresh, std::uint32_t waiting, std::uint32_t hints,
-                                             float spread2);
+using RayProceedFunction = std::uint32_t (*)(RayQueryLanes* query, std::uint32_t fresh, std::uint32_t waiting,
+                                             std::uint32_t hints, float spread2);
 /// Commits the candidate of the lanes of `live`.
 using RayConfirmFunction = void (*)(RayQueryLanes* query, std::uint32_t live);
 /// Commits a hit in the box that the lanes of `live` stand at, at the distances `t`, an array of max_lanes.

@@ -101,7 +101,8 @@ RTCGeometry RayMesh::attach(std::size_t index) {
     const rhi::GeometryDesc& desc = geometries_[index];
     const bool is_boxes = desc.type == rhi::GeometryType::boxes;
     if (desc.primitive_count == 0 || (desc.vertex_count == 0 && !is_boxes)) return nullptr;
-    RTCGeometry geometry = rtcNewGeometry(device_->handle(), is_boxes ? RTC_GEOMETRY_TYPE_USER : RTC_GEOMETRY_TYPE_TRIANGLE);
+    RTCGeometry geometry =
+        rtcNewGeometry(device_->handle(), is_boxes ? RTC_GEOMETRY_TYPE_USER : RTC_GEOMETRY_TYPE_TRIANGLE);
     if (!geometry) throw std::bad_alloc();
     // The scene keeps it.
     rtcAttachGeometryByID(scene_, geometry, static_cast<unsigned>(index));
@@ -126,8 +127,10 @@ RTCGeometry RayMesh::attach(std::size_t index) {
 }
 
 void RayMesh::fill(std::size_t index, const RayGeometrySource& source, bool is_update) {
-    if (geometries_[index].type == rhi::GeometryType::boxes) fill_boxes(index, source, is_update);
-    else fill_triangles(index, source, is_update);
+    if (geometries_[index].type == rhi::GeometryType::boxes)
+        fill_boxes(index, source, is_update);
+    else
+        fill_triangles(index, source, is_update);
     rtcCommitGeometry(attached_[index]);
 }
 
@@ -142,8 +145,8 @@ void RayMesh::fill_boxes(std::size_t index, const RayGeometrySource& source, boo
         if (is_good) {
             std::memcpy(&box, source.vertices + at, sizeof box);
             for (int axis = 0; axis < 3; ++axis)
-                is_good = is_good && box.lower[axis] <= box.upper[axis] && box.lower[axis] >= -largest_vertex_coordinate &&
-                          box.upper[axis] <= largest_vertex_coordinate;
+                is_good = is_good && box.lower[axis] <= box.upper[axis] &&
+                          box.lower[axis] >= -largest_vertex_coordinate && box.upper[axis] <= largest_vertex_coordinate;
         }
         if (!is_good) {
             box = {{1, 1, 1}, {0, 0, 0}};
@@ -247,7 +250,8 @@ void RayScene::build(std::vector<RayInstance> instances, bool) {
     bool has_candidates = false, has_overrides = false, has_boxes = false;
     for (std::size_t i = 0; i < instances.size(); ++i) {
         RayInstance& instance = instances[i];
-        if (!instance.mesh || !instance.mesh->scene() || !instance.mesh->has_primitives() || (instance.mask & 0xff) == 0)
+        if (!instance.mesh || !instance.mesh->scene() || !instance.mesh->has_primitives() ||
+            (instance.mask & 0xff) == 0)
             continue;
         const auto to_object = rhi::inverse_of(instance.to_world);
         if (!to_object) continue;
@@ -299,8 +303,10 @@ void RayScene::build(std::vector<RayInstance> instances, bool) {
     if (!usable.empty()) {
         RTCBounds bounds;
         rtcGetSceneBounds(scene, &bounds);
-        const float size[3] = {bounds.upper_x - bounds.lower_x, bounds.upper_y - bounds.lower_y, bounds.upper_z - bounds.lower_z};
-        coherent_spread2_ = (size[0] * size[0] + size[1] * size[1] + size[2] * size[2]) * coherent_share * coherent_share;
+        const float size[3] = {bounds.upper_x - bounds.lower_x, bounds.upper_y - bounds.lower_y,
+                               bounds.upper_z - bounds.lower_z};
+        coherent_spread2_ =
+            (size[0] * size[0] + size[1] * size[1] + size[2] * size[2]) * coherent_share * coherent_share;
     }
     device_->check_memory();
 }

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // How queries meet the scene. Lanes go one of three ways:
 // - Where every hit counts at once, one packet of Embree on the query's own memory.
-// - Where some geometry is not opaque, one packet whose filter collects candidates by the way and lets the ray go on; the shader then
+// - Where some geometry is not opaque, one packet whose filter collects candidates by the way and lets the ray go on;
+// the shader then
 //   gets them by rising distance. Of the candidates of a lane only the nearest `kept_candidates` have room.
-// - Where that room was too small, there are boxes, or a ray or instance overrules opacity or culls, one ray at a time with a filter for all geometry.
-//   It begins behind the last candidate that the shader saw. A single ray gives a triangle the same distance each time, a packet may
-//   not, so what is found here is in one order: that of (distance, instance, geometry, primitive).
+// - Where that room was too small, there are boxes, or a ray or instance overrules opacity or culls, one ray at a time
+// with a filter for all geometry.
+//   It begins behind the last candidate that the shader saw. A single ray gives a triangle the same distance each time,
+//   a packet may not, so what is found here is in one order: that of (distance, instance, geometry, primitive).
 #include "backends/cpu/rays/traversal.h"
 
 #include <algorithm>
@@ -164,7 +166,8 @@ void meet_box(const RTCIntersectFunctionNArguments* arguments) {
     RTCRayN* ray = RTCRayHitN_RayN(arguments->rayhit, 1);
     const float origin[3] = {RTCRayN_org_x(ray, 1, 0), RTCRayN_org_y(ray, 1, 0), RTCRayN_org_z(ray, 1, 0)};
     const float direction[3] = {RTCRayN_dir_x(ray, 1, 0), RTCRayN_dir_y(ray, 1, 0), RTCRayN_dir_z(ray, 1, 0)};
-    // From where the query begins, not the ray, which may begin behind what was seen: a box must come at the same distance each time.
+    // From where the query begins, not the ray, which may begin behind what was seen: a box must come at the same
+    // distance each time.
     float enters = call.query.t_min[call.lane], leaves = RTCRayN_tfar(ray, 1, 0);
     constexpr float rounding = 4 * std::numeric_limits<float>::epsilon();
     for (int axis = 0; axis < 3; ++axis) {
@@ -172,14 +175,21 @@ void meet_box(const RTCIntersectFunctionNArguments* arguments) {
             if (origin[axis] < box.lower[axis] || origin[axis] > box.upper[axis]) return;
             continue;
         }
-        const float a = (box.lower[axis] - origin[axis]) / direction[axis], b = (box.upper[axis] - origin[axis]) / direction[axis];
+        const float a = (box.lower[axis] - origin[axis]) / direction[axis],
+                    b = (box.upper[axis] - origin[axis]) / direction[axis];
         const float near = std::min(a, b), far = std::max(a, b);
         enters = std::max(enters, near - std::abs(near) * rounding);
         leaves = std::min(leaves, far + std::abs(far) * rounding);
     }
     if (!(enters <= leaves)) return;
-    keep_single(call, {.t = enters, .u = 0, .v = 0, .primitive = arguments->primID, .geometry = arguments->geomID, .instance = instance,
-                       .kind = ray_candidate_box | (is_opaque ? std::uint32_t{ray_candidate_opaque} : 0), .normal = {}});
+    keep_single(call, {.t = enters,
+                       .u = 0,
+                       .v = 0,
+                       .primitive = arguments->primID,
+                       .geometry = arguments->geomID,
+                       .instance = instance,
+                       .kind = ray_candidate_box | (is_opaque ? std::uint32_t{ray_candidate_opaque} : 0),
+                       .normal = {}});
 }
 
 /// Rays that only ask whether there is a hit pass through boxes; those that may meet some take another way.
@@ -323,9 +333,11 @@ void find_hits(const RayScene& scene, RayQueryLanes& query, std::uint32_t lanes,
 }
 
 /// First traversal of lanes of one scene; returns those that may have candidates.
-std::uint32_t traverse(const RayScene& scene, RayQueryLanes& query, std::uint32_t lanes, std::uint32_t hints, float spread2) {
+std::uint32_t traverse(const RayScene& scene, RayQueryLanes& query, std::uint32_t lanes, std::uint32_t hints,
+                       float spread2) {
     const std::uint32_t flags_of_any = hints >> ray_flags_shift;
-    const bool has_candidates = scene.has_candidates(), has_overrides = scene.has_overrides(), has_boxes = scene.has_boxes();
+    const bool has_candidates = scene.has_candidates(), has_overrides = scene.has_overrides(),
+               has_boxes = scene.has_boxes();
     if (!has_boxes && (flags_of_any & (flags_against_packets | ray_skip_triangles)) == 0 &&
         ((hints & ray_all_opaque) != 0 || (!has_candidates && !has_overrides))) {
         find_hits(scene, query, lanes, hints, spread2);
@@ -337,10 +349,14 @@ std::uint32_t traverse(const RayScene& scene, RayQueryLanes& query, std::uint32_
         query.candidate_count[lane] = query.next_candidate[lane] = query.has_more[lane] = 0;
         const bool meets_boxes = has_boxes && (flags & ray_skip_boxes) == 0;
         if ((flags & ray_skip_triangles) && !meets_boxes) return;
-        if (meets_boxes || (flags & flags_against_packets)) single |= bit;
-        else if ((flags & ray_opaque) || (!has_candidates && !has_overrides)) at_once |= bit;
-        else if (has_overrides || (hints & ray_one_by_one)) single |= bit;
-        else collecting |= bit;
+        if (meets_boxes || (flags & flags_against_packets))
+            single |= bit;
+        else if ((flags & ray_opaque) || (!has_candidates && !has_overrides))
+            at_once |= bit;
+        else if (has_overrides || (hints & ray_one_by_one))
+            single |= bit;
+        else
+            collecting |= bit;
         // Only where some geometry, instance or ray asks for it are there lists to look into.
         if (meets_boxes || (flags & ray_no_opaque) || (has_candidates && (flags & ray_opaque) == 0)) asking |= bit;
     });
@@ -355,14 +371,16 @@ std::uint32_t traverse(const RayScene& scene, RayQueryLanes& query, std::uint32_
     return asking;
 }
 
-std::uint32_t proceed(RayQueryLanes* query_pointer, std::uint32_t fresh, std::uint32_t waiting, std::uint32_t hints, float spread2) {
+std::uint32_t proceed(RayQueryLanes* query_pointer, std::uint32_t fresh, std::uint32_t waiting, std::uint32_t hints,
+                      float spread2) {
     RayQueryLanes& query = *query_pointer;
     while (fresh != 0) {
         const RayScene* scene = query.scene[std::countr_zero(fresh)];
         std::uint32_t same = fresh;
         if ((hints & ray_one_scene) == 0) {
             same = 0;
-            for_each_lane(fresh, [&](std::uint32_t lane) { same |= std::uint32_t{query.scene[lane] == scene} << lane; });
+            for_each_lane(fresh,
+                          [&](std::uint32_t lane) { same |= std::uint32_t{query.scene[lane] == scene} << lane; });
         }
         fresh &= ~same;
         if (scene && scene->scene()) waiting |= traverse(*scene, query, same, hints, spread2);
@@ -389,7 +407,8 @@ void commit(RayQueryLanes& query, std::uint32_t lane, float t, std::uint32_t kin
     query.geometry[lane] = query.candidate_geometry[lane];
     query.instance[lane] = query.candidate_instance[lane];
     query.kind[lane] = kind;
-    if (query.flags[lane] & ray_terminate_on_first_hit) query.status[lane] = static_cast<std::uint32_t>(RayStatus::finished);
+    if (query.flags[lane] & ray_terminate_on_first_hit)
+        query.status[lane] = static_cast<std::uint32_t>(RayStatus::finished);
 }
 
 bool is_at(const RayQueryLanes& query, std::uint32_t lane, bool box) {
@@ -406,7 +425,8 @@ void confirm(RayQueryLanes* query, std::uint32_t live) {
 void generate(RayQueryLanes* query, std::uint32_t live, const float* t) {
     for_each_lane(live, [&](std::uint32_t lane) {
         // What lies beyond the ray is no hit of it.
-        if (is_at(*query, lane, true) && t[lane] >= query->t_min[lane] && t[lane] <= query->t[lane]) commit(*query, lane, t[lane], 2);
+        if (is_at(*query, lane, true) && t[lane] >= query->t_min[lane] && t[lane] <= query->t[lane])
+            commit(*query, lane, t[lane], 2);
     });
 }
 

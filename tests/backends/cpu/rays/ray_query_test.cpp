@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ray queries of compute shaders on the CPU backend, for every number of lanes, and on Vulkan where the driver has them, against
-// every triangle in double precision.
+// Ray queries of compute shaders on the CPU backend, for every number of lanes, and on Vulkan where the driver has
+// them, against every triangle in double precision.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -84,7 +84,9 @@ void main() {
 }
 )";
 
-bool accepts(std::size_t ray, const ReferenceHit& hit) { return (hit.primitive + hit.geometry + hit.instance + ray) % 3 != 0; }
+bool accepts(std::size_t ray, const ReferenceHit& hit) {
+    return (hit.primitive + hit.geometry + hit.instance + ray) % 3 != 0;
+}
 
 /// A device with a scene in it.
 class World {
@@ -121,12 +123,14 @@ class World {
 
     template <typename T>
     Buffer buffer_of(const std::vector<T>& values, BufferUsage usage) {
-        const Buffer made = ok(device_->create_buffer({.size = std::max<std::size_t>(values.size() * sizeof(T), 16), .usage = usage}));
+        const Buffer made =
+            ok(device_->create_buffer({.size = std::max<std::size_t>(values.size() * sizeof(T), 16), .usage = usage}));
         if (!values.empty()) ok(device_->write_buffer(made, std::as_bytes(std::span(values))));
         return made;
     }
 
-    void build(const ReferenceScene& scene, bool allow_update = false, BuildPreference prefer = BuildPreference::fast_trace) {
+    void build(const ReferenceScene& scene, bool allow_update = false,
+               BuildPreference prefer = BuildPreference::fast_trace) {
         CommandList list = device_->create_command_list("build");
         meshes.clear();
         sources.clear();
@@ -138,15 +142,17 @@ class World {
                                            .primitive_count = static_cast<std::uint32_t>(geometry.triangles.size()),
                                            .vertex_count = static_cast<std::uint32_t>(geometry.vertices.size()),
                                            .index_type = IndexType::uint32});
-                of_mesh.push_back({.vertices = buffer_of(geometry.vertices, BufferUsage::acceleration_structure_input),
-                                   .indices = buffer_of(geometry.triangles, BufferUsage::acceleration_structure_input)});
+                of_mesh.push_back(
+                    {.vertices = buffer_of(geometry.vertices, BufferUsage::acceleration_structure_input),
+                     .indices = buffer_of(geometry.triangles, BufferUsage::acceleration_structure_input)});
             }
             meshes.push_back(ok(device_->create_acceleration_structure(desc)));
             list.build_acceleration_structure(meshes.back(), of_mesh);
         }
-        top = ok(device_->create_acceleration_structure({.level = AccelerationStructureLevel::top,
-                                                         .max_instances = std::max<std::uint32_t>(1, static_cast<std::uint32_t>(scene.instances.size())),
-                                                         .allow_update = allow_update}));
+        top = ok(device_->create_acceleration_structure(
+            {.level = AccelerationStructureLevel::top,
+             .max_instances = std::max<std::uint32_t>(1, static_cast<std::uint32_t>(scene.instances.size())),
+             .allow_update = allow_update}));
         list.build_acceleration_structure(top, instances_of(scene));
         submit(std::move(list));
     }
@@ -165,7 +171,8 @@ class World {
         CommandList list = device_->create_command_list("update");
         for (std::size_t m = 0; m < meshes.size(); ++m) {
             for (std::size_t g = 0; g < sources[m].size(); ++g)
-                ok(device_->write_buffer(sources[m][g].vertices, std::as_bytes(std::span(scene.meshes[m][g].vertices))));
+                ok(device_->write_buffer(sources[m][g].vertices,
+                                         std::as_bytes(std::span(scene.meshes[m][g].vertices))));
             list.update_acceleration_structure(meshes[m], sources[m]);
         }
         list.update_acceleration_structure(top, instances_of(scene));
@@ -179,7 +186,8 @@ class World {
     std::vector<Hit> trace(const std::vector<ReferenceRay>& rays, const std::string& text = each_ray,
                            const std::vector<BindGroupEntry>& more = {}) {
         ShaderCompiler compiler({});
-        const Shader shader = ok(device_->create_shader(ok(compiler.compile({.path = "rays.comp", .text = "#version 460\n" + text}))));
+        const Shader shader =
+            ok(device_->create_shader(ok(compiler.compile({.path = "rays.comp", .text = "#version 460\n" + text}))));
         const ComputePipeline pipeline = ok(device_->create_compute_pipeline({.shader = shader, .name = "rays"}));
         const Buffer input = buffer_of(rays, BufferUsage::storage);
         const Buffer output = buffer_of(std::vector<Hit>(rays.size()), BufferUsage::storage);
@@ -196,7 +204,8 @@ class World {
         submit(std::move(list));
         const std::vector<std::byte> bytes = ok(device_->read_buffer(output));
         std::vector<Hit> hits(rays.size());
-        if (bytes.size() >= hits.size() * sizeof(Hit)) std::memcpy(hits.data(), bytes.data(), hits.size() * sizeof(Hit));
+        if (bytes.size() >= hits.size() * sizeof(Hit))
+            std::memcpy(hits.data(), bytes.data(), hits.size() * sizeof(Hit));
         return hits;
     }
 
@@ -210,10 +219,12 @@ class World {
 };
 
 /// Every ray that is clear of ties and edges must agree, and enough of them must be.
-void expect_agreement(const ReferenceScene& scene, const std::vector<ReferenceRay>& rays, const std::vector<Hit>& hits) {
+void expect_agreement(const ReferenceScene& scene, const std::vector<ReferenceRay>& rays,
+                      const std::vector<Hit>& hits) {
     std::size_t compared = 0, hit_count = 0, unlike = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
-        const ReferenceAnswer expected = trace(scene, rays[i], [&](const ReferenceHit& hit) { return accepts(i, hit); });
+        const ReferenceAnswer expected =
+            trace(scene, rays[i], [&](const ReferenceHit& hit) { return accepts(i, hit); });
         ASSERT_EQ(hits[i].bad_candidates, 0u) << "ray " << i;
         if (expected.margin < 1e-4) continue;
         ++compared;
@@ -222,7 +233,8 @@ void expect_agreement(const ReferenceScene& scene, const std::vector<ReferenceRa
             // Any of them will do.
             hit = nullptr;
             for (const ReferenceHit& each : expected.hits)
-                if (each.instance == hits[i].instance && each.geometry == hits[i].geometry && each.primitive == hits[i].primitive)
+                if (each.instance == hits[i].instance && each.geometry == hits[i].geometry &&
+                    each.primitive == hits[i].primitive)
                     hit = &each;
             ASSERT_TRUE(hit) << "ray " << i << " hit what it cannot";
         }
@@ -256,8 +268,8 @@ class CpuRayQueries : public ::testing::TestWithParam<const char*> {
 };
 
 INSTANTIATE_TEST_SUITE_P(Rays, CpuRayQueries,
-                         ::testing::Values("cpu:fast:lanes=16", "cpu:fast:lanes=8", "cpu:fast:lanes=4", "cpu:consistent:lanes=16",
-                                           "cpu:consistent:lanes=4", "vulkan"),
+                         ::testing::Values("cpu:fast:lanes=16", "cpu:fast:lanes=8", "cpu:fast:lanes=4",
+                                           "cpu:consistent:lanes=16", "cpu:consistent:lanes=4", "vulkan"),
                          [](const auto& test) {
                              std::string name = test.param;
                              for (char& letter : name)
@@ -318,7 +330,8 @@ TEST_P(CpuRayQueries, RaysThatTerminateHitSomethingThatCounts) {
             rayQueryProceedEXT(query);
             hits[i] = Hit(uvec4(rayQueryGetIntersectionTypeEXT(query, true), 0, 0, 0), uvec4(0), uvec4(0));
         })";
-    const std::vector<Hit> occluded = world.trace(rays, declarations.substr(0, declarations.find("void store")) + whether);
+    const std::vector<Hit> occluded =
+        world.trace(rays, declarations.substr(0, declarations.find("void store")) + whether);
     std::size_t hit_count = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
         ReferenceRay ray = rays[i];
@@ -335,7 +348,8 @@ TEST_P(CpuRayQueries, LanesThatDivergeTraceTheirOwnRays) {
     const ReferenceScene scene = random_scene(9, 16);
     world.build(scene);
     const std::vector<ReferenceRay> rays = random_rays(64 * 24, 10, true);
-    // Each invocation has 24 rays; how many of them it traces at once with others, in which branch, and in which order, differs.
+    // Each invocation has 24 rays; how many of them it traces at once with others, in which branch, and in which order,
+    // differs.
     expect_agreement(scene, rays, world.trace(rays, declarations + R"(
         void main() {
             if (gl_WorkGroupID.x > 0) return;
@@ -396,7 +410,8 @@ TEST_P(CpuRayQueries, TrianglesWithoutAreaAreNeverHit) {
     for (std::size_t i = 0; i < rays.size(); ++i) {
         // Straight at the line that they have become.
         const float along = static_cast<float>(i) / 128.0f;
-        for (std::size_t axis = 0; axis < 3; ++axis) rays[i].direction[axis] = (axis == 0 ? along : 0) - rays[i].origin[axis];
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            rays[i].direction[axis] = (axis == 0 ? along : 0) - rays[i].origin[axis];
         rays[i].mask = 0xff;
     }
     for (const Hit& hit : world.trace(rays)) ASSERT_EQ(hit.type, 0u);
@@ -413,7 +428,8 @@ TEST_P(CpuRayQueries, MeshesThatAreBrokenAreHitWhereTheyAreSound) {
             for (std::size_t g = 0; g < scene.meshes[m].size(); ++g) {
                 ReferenceGeometry& geometry = scene.meshes[m][g];
                 std::vector<bool> is_bad(geometry.vertices.size());
-                for (std::size_t v = 0; v < geometry.vertices.size(); v += 5) geometry.vertices[v][v % 3] = bad, is_bad[v] = true;
+                for (std::size_t v = 0; v < geometry.vertices.size(); v += 5)
+                    geometry.vertices[v][v % 3] = bad, is_bad[v] = true;
                 // Indices beyond the vertices, too.
                 geometry.triangles[2][1] = 24;
                 geometry.triangles[5][0] = ~0u;
@@ -473,7 +489,8 @@ TEST_P(CpuRayQueries, CandidatesBeyondThoseThatAreKeptComeToo) {
     geometry.opaque = false;
     for (std::uint32_t i = 0; i < panes; ++i) {
         const auto z = static_cast<float>(i + 1);
-        for (const auto& [x, y] : {std::pair(-9.0f, -9.0f), std::pair(20.0f, -9.0f), std::pair(-9.0f, 20.0f)}) geometry.vertices.push_back({x, y, z});
+        for (const auto& [x, y] : {std::pair(-9.0f, -9.0f), std::pair(20.0f, -9.0f), std::pair(-9.0f, 20.0f)})
+            geometry.vertices.push_back({x, y, z});
         geometry.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
     }
     scene.instances.resize(1);
@@ -486,7 +503,8 @@ TEST_P(CpuRayQueries, CandidatesBeyondThoseThatAreKeptComeToo) {
                 const float x = 0.01f * static_cast<float>(i);
                 rays[i] = {.origin = {x, x, 0}, .direction = {0.1f, 0, 1}, .flags = flags};
             }
-            const std::vector<Hit> hits = world.trace(rays, declarations.substr(0, declarations.find("// Candidates of")) + R"(
+            const std::vector<Hit> hits =
+                world.trace(rays, declarations.substr(0, declarations.find("// Candidates of")) + R"(
                 void main() {
                     uint i = gl_GlobalInvocationID.x;
                     if (i >= rays.length()) return;
@@ -559,7 +577,8 @@ TEST_P(CpuRayQueries, SpheresInBoxesAgreeWithTheirEquation) {
                     continue;
                 }
                 if ((rays[i].flags.x & 3u) == 0u && rayQueryGetIntersectionCandidateAABBOpaqueEXT(query) != (geometry == 0)) ++candidates.y;
-                vec4 sphere = spheres[geometry * )" + std::to_string(count) + R"( + primitive];
+                vec4 sphere = spheres[geometry * )" +
+                             std::to_string(count) + R"( + primitive];
                 vec3 o = rayQueryGetIntersectionObjectRayOriginEXT(query, false) - sphere.xyz;
                 vec3 d = rayQueryGetIntersectionObjectRayDirectionEXT(query, false);
                 float a = dot(d, d), b = dot(o, d);
@@ -590,18 +609,22 @@ TEST_P(CpuRayQueries, SpheresInBoxesAgreeWithTheirEquation) {
                 for (const float value : spheres[i].center) to.push_back(value + sign * side);
             if (i >= count) to.insert(to.end(), 2, 77.0f);
         }
-        const std::vector<GeometrySource> sources{{.vertices = world.buffer_of(first, BufferUsage::acceleration_structure_input)},
-                                                  {.vertices = world.buffer_of(second, BufferUsage::acceleration_structure_input)}};
+        const std::vector<GeometrySource> sources{
+            {.vertices = world.buffer_of(first, BufferUsage::acceleration_structure_input)},
+            {.vertices = world.buffer_of(second, BufferUsage::acceleration_structure_input)}};
         CommandList list = world.device().create_command_list("boxes");
-        if (frame == 0) list.build_acceleration_structure(boxes, sources);
-        else list.update_acceleration_structure(boxes, sources);
+        if (frame == 0)
+            list.build_acceleration_structure(boxes, sources);
+        else
+            list.update_acceleration_structure(boxes, sources);
         list.build_acceleration_structure(world.top, world.instances_of(scene));
         world.submit(std::move(list));
 
         std::vector<ReferenceRay> rays = random_rays(1500, 41 + static_cast<std::uint32_t>(frame), false);
         constexpr std::uint32_t flags[] = {0, 0, 0x1, 0x2, 0x40, 0x80, 0x100, 0x200, 0x4, 0x201, 0x102};
         for (std::size_t i = 0; i < rays.size(); ++i) rays[i].flags = flags[i % std::size(flags)];
-        const std::vector<Hit> hits = world.trace(rays, text, {{.binding = 3, .buffer = world.buffer_of(spheres, BufferUsage::storage)}});
+        const std::vector<Hit> hits =
+            world.trace(rays, text, {{.binding = 3, .buffer = world.buffer_of(spheres, BufferUsage::storage)}});
         std::size_t compared = 0, of_spheres = 0, of_triangles = 0;
         for (std::size_t i = 0; i < rays.size(); ++i) {
             const ReferenceRay& ray = rays[i];
@@ -619,7 +642,8 @@ TEST_P(CpuRayQueries, SpheresInBoxesAgreeWithTheirEquation) {
                 for (std::size_t row = 0; row < 3; ++row) {
                     const float* m = inverse->data() + row * 4;
                     o[row] = double{m[3]}, d[row] = 0;
-                    for (std::size_t k = 0; k < 3; ++k) o[row] += double{m[k]} * ray.origin[k], d[row] += double{m[k]} * ray.direction[k];
+                    for (std::size_t k = 0; k < 3; ++k)
+                        o[row] += double{m[k]} * ray.origin[k], d[row] += double{m[k]} * ray.direction[k];
                 }
                 for (std::uint32_t s = 0; s < 2 * count; ++s) {
                     bool is_opaque = s < count;
@@ -631,7 +655,8 @@ TEST_P(CpuRayQueries, SpheresInBoxesAgreeWithTheirEquation) {
                         const double from = o[k] - spheres[s].center[k];
                         a += d[k] * d[k], b += from * d[k], c += from * from;
                     }
-                    const double radius2 = double{spheres[s].radius} * spheres[s].radius, below = radius2 - (c - b * b / a);
+                    const double radius2 = double{spheres[s].radius} * spheres[s].radius,
+                                 below = radius2 - (c - b * b / a);
                     if (below > -0.2 * radius2) margin = std::min(margin, std::abs(below) / radius2 / 100);
                     if (below < 0) continue;
                     const double half_chord = std::sqrt(below / a);
@@ -642,7 +667,10 @@ TEST_P(CpuRayQueries, SpheresInBoxesAgreeWithTheirEquation) {
                     }
                     if (t < ray.t_min) t = -b / a + half_chord;
                     if (t < ray.t_min || t > ray.t_max) continue;
-                    ReferenceHit hit{.t = t, .instance = static_cast<std::uint32_t>(n), .geometry = s / count, .primitive = s % count};
+                    ReferenceHit hit{.t = t,
+                                     .instance = static_cast<std::uint32_t>(n),
+                                     .geometry = s / count,
+                                     .primitive = s % count};
                     all.emplace_back(hit, true);
                     second_t = std::min(second_t, std::max(t, best.t));
                     if (t < best.t) best = hit, is_sphere = true;
@@ -660,7 +688,10 @@ TEST_P(CpuRayQueries, SpheresInBoxesAgreeWithTheirEquation) {
                 ASSERT_TRUE(is_one) << "ray " << i;
                 continue;
             }
-            ASSERT_EQ(hits[i].type, !best.exists() ? 0u : is_sphere ? 2u : 1u) << "ray " << i << ", flags " << ray.flags;
+            ASSERT_EQ(hits[i].type, !best.exists() ? 0u
+                                    : is_sphere    ? 2u
+                                                   : 1u)
+                << "ray " << i << ", flags " << ray.flags;
             if (!best.exists()) continue;
             ++(is_sphere ? of_spheres : of_triangles);
             ASSERT_NEAR(hits[i].t, best.t, 1e-3 * (1 + best.t)) << "ray " << i;
@@ -699,7 +730,8 @@ TEST(CpuRayQueryBits, AreTheSameForEveryNumberOfLanesAndThreads) {
     ReferenceScene sheet;
     ReferenceGeometry& geometry = sheet.meshes.emplace_back().emplace_back();
     for (std::uint32_t y = 0; y <= 8; ++y)
-        for (std::uint32_t x = 0; x <= 8; ++x) geometry.vertices.push_back({static_cast<float>(x) - 4, static_cast<float>(y) - 4, 0});
+        for (std::uint32_t x = 0; x <= 8; ++x)
+            geometry.vertices.push_back({static_cast<float>(x) - 4, static_cast<float>(y) - 4, 0});
     for (std::uint32_t y = 0; y < 8; ++y)
         for (std::uint32_t x = 0; x < 8; ++x) {
             const std::uint32_t a = y * 9 + x;
@@ -716,14 +748,16 @@ TEST(CpuRayQueryBits, AreTheSameForEveryNumberOfLanesAndThreads) {
         grid.push_back({.origin = {0.25f, 0.5f, -3}, .direction = {x - 0.25f, y - 0.5f, 3}});
     }
     std::map<std::string, std::vector<Hit>> first;
-    for (const char* spec : {"cpu:consistent:lanes=16:threads=2", "cpu:consistent:lanes=8:threads=1", "cpu:consistent:lanes=4:threads=2"}) {
+    for (const char* spec : {"cpu:consistent:lanes=16:threads=2", "cpu:consistent:lanes=8:threads=1",
+                             "cpu:consistent:lanes=4:threads=2"}) {
         World world(spec);
         ASSERT_EQ(world.absent(), "");
         const auto expect_same = [&](const std::string& name, const std::vector<Hit>& hits) {
             const auto [at, is_new] = first.emplace(name, hits);
             if (is_new) return;
             for (std::size_t i = 0; i < hits.size(); ++i)
-                ASSERT_EQ(std::memcmp(&hits[i], &at->second[i], sizeof(Hit)), 0) << spec << ", " << name << ", ray " << i;
+                ASSERT_EQ(std::memcmp(&hits[i], &at->second[i], sizeof(Hit)), 0)
+                    << spec << ", " << name << ", ray " << i;
         };
         world.build(scene);
         expect_same("scattered", world.trace(scattered));

@@ -21,8 +21,8 @@ double length(const Vector& a) { return std::sqrt(dot(a, a)); }
 Vector to_world(const std::array<float, 12>& m, const std::array<float, 3>& point) {
     Vector result;
     for (std::size_t row = 0; row < 3; ++row)
-        result[row] = double{m[row * 4]} * point[0] + double{m[row * 4 + 1]} * point[1] + double{m[row * 4 + 2]} * point[2] +
-                      double{m[row * 4 + 3]};
+        result[row] = double{m[row * 4]} * point[0] + double{m[row * 4 + 1]} * point[1] +
+                      double{m[row * 4 + 2]} * point[2] + double{m[row * 4 + 3]};
     return result;
 }
 double determinant(const std::array<float, 12>& m) {
@@ -30,8 +30,14 @@ double determinant(const std::array<float, 12>& m) {
 }
 
 enum RayFlag : std::uint32_t {
-    opaque = 0x1, no_opaque = 0x2, terminate = 0x4, cull_back = 0x10, cull_front = 0x20, cull_opaque = 0x40,
-    cull_no_opaque = 0x80, skip_triangles = 0x100,
+    opaque = 0x1,
+    no_opaque = 0x2,
+    terminate = 0x4,
+    cull_back = 0x10,
+    cull_front = 0x20,
+    cull_opaque = 0x40,
+    cull_no_opaque = 0x80,
+    skip_triangles = 0x100,
 };
 
 bool counts_at_once(const ReferenceGeometry& geometry, const ReferenceInstance& instance, std::uint32_t flags) {
@@ -62,7 +68,8 @@ ReferenceAnswer trace(const ReferenceScene& scene, const ReferenceRay& ray,
                 std::array<Vector, 3> corners;
                 for (std::size_t k = 0; k < 3; ++k)
                     corners[k] = to_world(instance.transform, geometries[g].vertices[geometries[g].triangles[p][k]]);
-                const Vector e1 = corners[1] - corners[0], e2 = corners[2] - corners[0], to_origin = origin - corners[0];
+                const Vector e1 = corners[1] - corners[0], e2 = corners[2] - corners[0],
+                             to_origin = origin - corners[0];
                 const Vector normal = cross(e1, e2);
                 const double along = -dot(direction, normal);
                 if (along == 0) continue;
@@ -90,8 +97,10 @@ ReferenceAnswer trace(const ReferenceScene& scene, const ReferenceRay& ray,
                     continue;
                 if (!is_opaque && !accepts(hit)) continue;
                 answer.hits.push_back(hit);
-                if (hit.t < answer.closest.t) second = answer.closest.t, answer.closest = hit;
-                else second = std::min(second, hit.t);
+                if (hit.t < answer.closest.t)
+                    second = answer.closest.t, answer.closest = hit;
+                else
+                    second = std::min(second, hit.t);
             }
         }
     }
@@ -108,7 +117,8 @@ ReferenceScene random_scene(std::uint32_t seed, std::uint32_t instances) {
         for (std::uint32_t g = 0; g <= m; ++g) {
             ReferenceGeometry& geometry = geometries.emplace_back();
             geometry.opaque = (m + g) % 2 == 0;
-            for (std::uint32_t v = 0; v < 24; ++v) geometry.vertices.push_back({around(random), around(random), around(random)});
+            for (std::uint32_t v = 0; v < 24; ++v)
+                geometry.vertices.push_back({around(random), around(random), around(random)});
             for (std::uint32_t t = 0; t < 16 + 5 * m; ++t) {
                 const std::uint32_t a = static_cast<std::uint32_t>(random() % 24);
                 geometry.triangles.push_back({a, static_cast<std::uint32_t>(a + 1 + random() % 11) % 24,
@@ -117,8 +127,8 @@ ReferenceScene random_scene(std::uint32_t seed, std::uint32_t instances) {
         }
     }
     using enum rhi::InstanceFlags;
-    constexpr rhi::InstanceFlags flags[] = {none, disable_culling, flip_facing, force_opaque, force_no_opaque,
-                                            flip_facing | force_opaque, none, none};
+    constexpr rhi::InstanceFlags flags[] = {
+        none, disable_culling, flip_facing, force_opaque, force_no_opaque, flip_facing | force_opaque, none, none};
     for (std::uint32_t i = 0; i < instances; ++i) {
         ReferenceInstance& instance = scene.instances.emplace_back();
         instance.mesh = random() % scene.meshes.size();
@@ -139,8 +149,17 @@ ReferenceScene random_scene(std::uint32_t seed, std::uint32_t instances) {
 std::vector<ReferenceRay> random_rays(std::size_t count, std::uint32_t seed, bool with_flags) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<float> around(-1, 1);
-    constexpr std::uint32_t flags[] = {0, 0, opaque, no_opaque, cull_back, cull_front, cull_opaque, cull_no_opaque,
-                                       cull_back | opaque, cull_front | no_opaque, skip_triangles};
+    constexpr std::uint32_t flags[] = {0,
+                                       0,
+                                       opaque,
+                                       no_opaque,
+                                       cull_back,
+                                       cull_front,
+                                       cull_opaque,
+                                       cull_no_opaque,
+                                       cull_back | opaque,
+                                       cull_front | no_opaque,
+                                       skip_triangles};
     std::vector<ReferenceRay> rays(count);
     for (ReferenceRay& ray : rays) {
         for (float& value : ray.origin) value = 4 * around(random);

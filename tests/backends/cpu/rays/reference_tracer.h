@@ -10,8 +10,8 @@
 #include "rhi/acceleration_structure.h"
 
 /// @file
-/// Rays against every triangle of every instance, in double precision: slow, without a tree, and with the distance to all that
-/// could tip the balance, so that a test knows which rays it may judge.
+/// Rays against every triangle of every instance, in double precision: slow, without a tree, and with the distance to
+/// all that could tip the balance, so that a test knows which rays it may judge.
 ///
 ///     const ReferenceScene scene = random_scene(1);
 ///     const ReferenceHit hit = closest_hit(scene, ray, [](const ReferenceHit& candidate) { return true; });
@@ -55,8 +55,8 @@ struct ReferenceHit {
 struct ReferenceAnswer {
     ReferenceHit closest;
     std::vector<ReferenceHit> hits;  ///< All that would count, the closest included, in no order.
-    /// How near the ray came to an edge, to an end of its interval, to a triangle seen from the side, or its closest hit to
-    /// another. Below about 1e-4 single precision may see it otherwise.
+    /// How near the ray came to an edge, to an end of its interval, to a triangle seen from the side, or its closest
+    /// hit to another. Below about 1e-4 single precision may see it otherwise.
     double margin = std::numeric_limits<double>::infinity();
 };
 

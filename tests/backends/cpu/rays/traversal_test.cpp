@@ -34,10 +34,12 @@ Built build(const ReferenceScene& from, const std::string& options) {
                                   .primitive_count = static_cast<std::uint32_t>(geometry.triangles.size()),
                                   .vertex_count = static_cast<std::uint32_t>(geometry.vertices.size()),
                                   .index_type = rhi::IndexType::uint32});
-            sources.push_back({reinterpret_cast<const std::byte*>(geometry.vertices.data()), geometry.vertices.size() * 12,
-                               reinterpret_cast<const std::byte*>(geometry.triangles.data()), geometry.triangles.size() * 12});
+            sources.push_back(
+                {reinterpret_cast<const std::byte*>(geometry.vertices.data()), geometry.vertices.size() * 12,
+                 reinterpret_cast<const std::byte*>(geometry.triangles.data()), geometry.triangles.size() * 12});
         }
-        result.meshes.push_back(std::make_shared<RayMesh>(result.device, geometries, false, rhi::BuildPreference::fast_trace));
+        result.meshes.push_back(
+            std::make_shared<RayMesh>(result.device, geometries, false, rhi::BuildPreference::fast_trace));
         result.meshes.back()->build(sources, false);
     }
     result.scene = std::make_unique<RayScene>(result.device, false, rhi::BuildPreference::fast_trace);
@@ -64,7 +66,8 @@ void run_query(RayQueryLanes& query, std::uint32_t lanes, std::uint32_t hints,
         for (std::uint32_t lane = 0; lane < max_lanes; ++lane) {
             const bool waits = (waiting >> lane & 1) != 0;
             query.status[lane] = static_cast<std::uint32_t>(waits ? RayStatus::waiting : RayStatus::finished);
-            if (waits && accepts(lane, query.candidate_primitive[lane] + query.candidate_geometry[lane] + query.candidate_instance[lane]))
+            if (waits && accepts(lane, query.candidate_primitive[lane] + query.candidate_geometry[lane] +
+                                           query.candidate_instance[lane]))
                 accepted |= 1u << lane;
         }
         ray_confirm_function()(&query, accepted);
@@ -80,7 +83,8 @@ class RayTraversal : public ::testing::TestWithParam<const char*> {
     void SetUp() override {
         const auto native = RayDevice::create(1);
         ASSERT_TRUE(native) << native.error().message();
-        if (std::string(GetParam()) == "isa=avx2" && (*native)->packet_width() < 8) GTEST_SKIP() << "this machine has no AVX2";
+        if (std::string(GetParam()) == "isa=avx2" && (*native)->packet_width() < 8)
+            GTEST_SKIP() << "this machine has no AVX2";
     }
 };
 INSTANTIATE_TEST_SUITE_P(Widths, RayTraversal, ::testing::Values("isa=sse2", "isa=avx2", ""), [](const auto& test) {
@@ -105,7 +109,9 @@ TEST_P(RayTraversal, PacketsWithSomeOfTheirLanesAgreeWithEveryTriangle) {
             std::memset(query.get(), 0xcd, sizeof *query);
             const auto packet = static_cast<std::uint32_t>(first / max_lanes);
             // All, one, and whatever lies between.
-            const std::uint32_t lanes = packet % 4 == 0 ? 0xffffu : packet % 4 == 1 ? 1u << packet % 16 : (packet * 2654435761u) >> 16;
+            const std::uint32_t lanes = packet % 4 == 0   ? 0xffffu
+                                        : packet % 4 == 1 ? 1u << packet % 16
+                                                          : (packet * 2654435761u) >> 16;
             std::uint32_t flags = 0;
             for (std::uint32_t lane = 0; lane < max_lanes; ++lane) {
                 const ReferenceRay& ray = rays[first + lane];
@@ -139,7 +145,8 @@ TEST_P(RayTraversal, PacketsWithSomeOfTheirLanesAgreeWithEveryTriangle) {
                 ASSERT_EQ(query->instance[lane], expected.closest.instance) << "ray " << first + lane;
                 ASSERT_EQ(query->geometry[lane], expected.closest.geometry) << "ray " << first + lane;
                 ASSERT_EQ(query->primitive[lane], expected.closest.primitive) << "ray " << first + lane;
-                ASSERT_NEAR(query->t[lane], expected.closest.t, 1e-4 * (1 + expected.closest.t)) << "ray " << first + lane;
+                ASSERT_NEAR(query->t[lane], expected.closest.t, 1e-4 * (1 + expected.closest.t))
+                    << "ray " << first + lane;
             }
         }
         EXPECT_GT(compared, 300u);
@@ -173,7 +180,8 @@ TEST_P(RayTraversal, LanesOfSeveralScenesAreTracedInTheirs) {
                 ASSERT_EQ(query->geometry[lane], no_hit);
                 continue;
             }
-            const ReferenceAnswer expected = trace(from[lane % 2], rays[first + lane], [](const ReferenceHit&) { return true; });
+            const ReferenceAnswer expected =
+                trace(from[lane % 2], rays[first + lane], [](const ReferenceHit&) { return true; });
             if (expected.margin < 1e-4) continue;
             ASSERT_EQ(query->geometry[lane] != no_hit, expected.closest.exists()) << "ray " << first + lane;
             if (!expected.closest.exists()) continue;
