@@ -18,9 +18,13 @@ Check CommandValidator::check_geometry_source(const char* attempted, const Accel
         std::uint64_t offset, bytes, alignment;
     };
     const std::uint64_t index_bytes = geometry.index_type == IndexType::uint16 ? 2 : 4;
+    const bool is_boxes = geometry.type == GeometryType::boxes;
+    const std::uint32_t element_count = is_boxes ? geometry.primitive_count : geometry.vertex_count;
+    const std::uint64_t element_bytes = is_boxes ? 24 : 12;
     const Part parts[] = {
-        {"vertex buffer", source.vertices.handle, source.vertex_offset,
-         geometry.vertex_count == 0 ? 0 : std::uint64_t{geometry.vertex_count - 1} * geometry.vertex_stride + 12, 4},
+        {is_boxes ? "box buffer" : "vertex buffer", source.vertices.handle, source.vertex_offset,
+         element_count == 0 ? 0 : std::uint64_t{element_count - 1} * geometry.vertex_stride + element_bytes,
+         is_boxes ? 8u : 4u},
         {"index buffer", source.indices.handle, source.index_offset,
          geometry.index_type ? std::uint64_t{geometry.primitive_count} * 3 * index_bytes : 0, index_bytes}};
     for (const Part& part : parts) {

@@ -302,11 +302,29 @@ Check check_acceleration_structure(const AccelerationStructureDesc& desc, const 
             return problem(Rule::acceleration_structure_geometry, ErrorCode::invalid_argument,
                            fmt::format("geometry {}: {}", i, reason), std::move(remedy));
         };
-        if (geometry.type != GeometryType::triangles)
+        if (geometry.type == GeometryType::curves)
             return problem(Rule::acceleration_structure_unsupported, ErrorCode::unsupported,
-                           fmt::format("geometry {}: expected triangles, found {}", i,
-                                       geometry.type == GeometryType::boxes ? "boxes" : "curves"),
-                           "Use triangles; no device has other geometry yet.");
+                           fmt::format("geometry {}: expected triangles or boxes, found curves", i),
+                           "Use triangles or boxes; no device has curves yet.");
+        if (geometry.type != desc.geometries[0].type)
+            return wrong("expected geometries of one type, found boxes and triangles",
+                         "Put boxes into bottom levels of their own.");
+        primitives += geometry.primitive_count;
+        if (primitives > max_structure_primitives || geometry.vertex_count > max_structure_primitives)
+            return wrong(
+                fmt::format("expected at most {} primitives and vertices in all, found more", max_structure_primitives),
+                "Split the geometry over several bottom levels.");
+        if (geometry.type == GeometryType::boxes) {
+            if (geometry.vertex_stride < 24 || geometry.vertex_stride > 65536 || geometry.vertex_stride % 8 != 0)
+                return wrong(
+                    fmt::format("expected boxes with a stride of 24 to 65536 bytes that is a multiple of 8, found {}",
+                                geometry.vertex_stride),
+                    "Set GeometryDesc::vertex_stride, 24 for boxes without a gap.");
+            if (geometry.vertex_count != 0 || geometry.index_type)
+                return wrong("expected boxes without vertices and indices, found some",
+                             "Leave GeometryDesc::vertex_count and index_type as they are.");
+            continue;
+        }
         if (geometry.vertex_format != Format::rgb32_float)
             return wrong(fmt::format("expected vertices of format {}, found {}", info(Format::rgb32_float).name,
                                      info(geometry.vertex_format).name),
@@ -322,11 +340,6 @@ Check check_acceleration_structure(const AccelerationStructureDesc& desc, const 
             return wrong(fmt::format("expected three vertices for each of {} triangles without indices, found {}",
                                      geometry.primitive_count, geometry.vertex_count),
                          "Correct the counts, or set GeometryDesc::index_type.");
-        primitives += geometry.primitive_count;
-        if (primitives > max_structure_primitives || geometry.vertex_count > max_structure_primitives)
-            return wrong(fmt::format("expected at most {} triangles and vertices in all, found more",
-                                     max_structure_primitives),
-                         "Split the mesh over several bottom levels.");
     }
     return {};
 }

@@ -6,7 +6,8 @@ namespace {
 
 constexpr VkAccessFlags writing_accesses = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_COLOR_ATTACHMENT_WRITE_BIT |
                                            VK_ACCESS_DEPTH_STENCIL_ATTACHMENT_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT |
-                                           VK_ACCESS_HOST_WRITE_BIT | VK_ACCESS_MEMORY_WRITE_BIT;
+                                           VK_ACCESS_HOST_WRITE_BIT | VK_ACCESS_MEMORY_WRITE_BIT |
+                                           VK_ACCESS_ACCELERATION_STRUCTURE_WRITE_BIT_KHR;
 
 VkPipelineStageFlags shader_stages(rhi::ShaderStage stages) {
     VkPipelineStageFlags flags = 0;
@@ -49,6 +50,12 @@ Access access_of(const rhi::ResourceState& state) {
     add(copy_source, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_READ_BIT);
     add(copy_destination, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
     add(host_read, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
+    constexpr VkPipelineStageFlags builds = VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR;
+    add(build_input, builds, VK_ACCESS_SHADER_READ_BIT);
+    // Builds of top levels read bottom levels, whatever shaders do.
+    add(acceleration_structure_read, shaders | builds, VK_ACCESS_ACCELERATION_STRUCTURE_READ_BIT_KHR);
+    add(acceleration_structure_write, builds,
+        VK_ACCESS_ACCELERATION_STRUCTURE_READ_BIT_KHR | VK_ACCESS_ACCELERATION_STRUCTURE_WRITE_BIT_KHR);
     return result;
 }
 
@@ -76,7 +83,7 @@ void BarrierRecorder::add(const rhi::Barrier& barrier) {
     const Access after = access_of(barrier.after);
     // Only writes need to be made available; reads before a write need to have been executed, no more.
     before.access &= writing_accesses;
-    if (barrier.buffer) {
+    if (barrier.buffer || barrier.acceleration_structure) {
         has_memory_ = true;
         memory_before_.stages |= before.stages;
         memory_before_.access |= before.access;

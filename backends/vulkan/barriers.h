@@ -39,7 +39,7 @@ class BarrierRecorder {
     void flush(VkCommandBuffer commands);
 
     const Context& context_;
-    Access memory_before_, memory_after_;  ///< All buffers together: drivers know no finer than that.
+    Access memory_before_, memory_after_;  ///< All buffers and structures together: drivers know no finer than that.
     bool has_memory_ = false;
     std::vector<ImageStep> images_;
     std::vector<VkImageMemoryBarrier> legacy_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "backends/vulkan/acceleration_structure.h"
 #include "backends/vulkan/buffer.h"
 #include "backends/vulkan/formats.h"
 #include "backends/vulkan/result.h"
@@ -151,6 +152,8 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> BindGroup::create(Context& cont
     // Filled to their final size first: the writes hold addresses of their elements.
     std::vector<VkDescriptorBufferInfo> buffers(bindings.size());
     std::vector<VkDescriptorImageInfo> images(bindings.size());
+    std::vector<VkWriteDescriptorSetAccelerationStructureKHR> structures(
+        bindings.size(), {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET_ACCELERATION_STRUCTURE_KHR});
     std::vector<VkWriteDescriptorSet> writes(bindings.size(), {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET});
     for (std::size_t i = 0; i < bindings.size(); ++i) {
         const rhi::BackendBinding& from = bindings[i];
@@ -163,6 +166,12 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> BindGroup::create(Context& cont
         if (from.buffer) {
             buffers[i] = {native(*from.buffer).handle, from.offset, from.size};
             write.pBufferInfo = &buffers[i];
+            continue;
+        }
+        if (from.acceleration_structure) {
+            structures[i].accelerationStructureCount = 1;
+            structures[i].pAccelerationStructures = &native(*from.acceleration_structure).handle;
+            write.pNext = &structures[i];
             continue;
         }
         if (from.sampler) images[i].sampler = static_cast<Sampler&>(*from.sampler).handle;

@@ -5,18 +5,22 @@
 
 namespace nacre::vulkan {
 
-Expected<std::unique_ptr<rhi::BackendBuffer>> Buffer::create(Context& context, const rhi::BufferDesc& desc) {
+Expected<std::unique_ptr<rhi::BackendBuffer>> Buffer::create(Context& context, const rhi::BufferDesc& desc,
+                                                             VkBufferUsageFlags usage) {
     std::unique_ptr<Buffer> buffer(new Buffer(context));
     buffer->desc = desc;
     VkBufferCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};
     info.size = desc.size;
     // Copies cost nothing to allow, and the front end uses them for its own uploads, read-backs and fills.
-    info.usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+    info.usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT | usage;
     if (has_any(desc.usage, rhi::BufferUsage::vertex)) info.usage |= VK_BUFFER_USAGE_VERTEX_BUFFER_BIT;
     if (has_any(desc.usage, rhi::BufferUsage::index)) info.usage |= VK_BUFFER_USAGE_INDEX_BUFFER_BIT;
     if (has_any(desc.usage, rhi::BufferUsage::uniform)) info.usage |= VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT;
     if (has_any(desc.usage, rhi::BufferUsage::storage)) info.usage |= VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
     if (has_any(desc.usage, rhi::BufferUsage::indirect)) info.usage |= VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT;
+    if (has_any(desc.usage, rhi::BufferUsage::acceleration_structure_input))
+        info.usage |= VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR |
+                      VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
     const std::string subject = "buffer " + in_quotes(desc.name);
     // Before the driver: some drivers overflow on sizes near the end of the 64-bit range.
     if (desc.size > context.capabilities.max_buffer_size)
@@ -49,6 +53,12 @@ Expected<std::unique_ptr<rhi::BackendBuffer>> Buffer::create(Context& context, c
     buffer->memory_bytes = buffer->memory.size();
     context.set_name(buffer->handle, VK_OBJECT_TYPE_BUFFER, desc.name);
     return buffer;
+}
+
+VkDeviceAddress Buffer::address() const {
+    VkBufferDeviceAddressInfo info{VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO};
+    info.buffer = handle;
+    return context_.vk.GetBufferDeviceAddress(context_.device, &info);
 }
 
 Buffer::~Buffer() {

@@ -149,6 +149,16 @@ std::vector<const char*> choose_features(const PhysicalDevice& device, bool dyna
         chain(enabled.core, enabled.line_rasterization);
         extensions.push_back(VK_EXT_LINE_RASTERIZATION_EXTENSION_NAME);
     }
+    if (device.has_ray_query) {
+        enabled.vulkan12.bufferDeviceAddress = VK_TRUE;
+        enabled.acceleration_structure.accelerationStructure = VK_TRUE;
+        enabled.ray_query.rayQuery = VK_TRUE;
+        chain(enabled.core, enabled.acceleration_structure);
+        chain(enabled.core, enabled.ray_query);
+        extensions.push_back(VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME);
+        extensions.push_back(VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME);
+        extensions.push_back(VK_KHR_RAY_QUERY_EXTENSION_NAME);
+    }
     return extensions;
 }
 
@@ -185,6 +195,7 @@ rhi::Capabilities capabilities_of(const Instance& instance, const PhysicalDevice
     result.shader_int8 = vulkan12.shaderInt8;
     result.sample_rate_shading = features.sampleRateShading;
     result.block_compression = features.textureCompressionBC;
+    result.ray_query = enabled.ray_query.rayQuery;
     result.base_instance = true;
     result.texture_views = true;
     result.texture_view_formats = true;

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <bit>
 
+#include "backends/vulkan/acceleration_structure.h"
 #include "backends/vulkan/buffer.h"
 #include "backends/vulkan/result.h"
 
@@ -29,6 +30,7 @@ Expected<void> Commands::record(const rhi::ExecutionPlan& plan) {
         return fail(context_.check(result), "reset", "command pool");
     used_buffers_ = 0;
     order_.clear();
+    kept_.clear();
     open_groups_.clear();
     status_ = {};
     NACRE_CHECK(begin_part());
@@ -269,7 +271,12 @@ void Commands::visit(const rhi::CommandHeader& header, const std::byte* payload,
         case end_occlusion_query: end_occlusion(NACRE_AS(EndOcclusionQueryCommand)); break;
         case push_debug_group: push_group(stream.strings[NACRE_AS(PushDebugGroupCommand).name].c_str()); break;
         case pop_debug_group: pop_group(); break;
-        case build_acceleration_structure:  // No device of this backend offers them.
+        case build_acceleration_structure: {
+            const auto& command = NACRE_AS(BuildAccelerationStructureCommand);
+            if (auto built = native(*command.structure.object).record_build(commands_, command, kept_); !built)
+                fail_with(std::unexpected(std::move(built).error()));
+            break;
+        }
         case begin_statement:
         case end_statement: break;
     }

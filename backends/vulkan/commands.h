@@ -87,6 +87,7 @@ class Commands {
     std::vector<VkCommandBuffer> order_;
     VkCommandBuffer commands_ = VK_NULL_HANDLE;  ///< Of the current part.
     BarrierRecorder barriers_;
+    std::vector<std::unique_ptr<rhi::BackendBuffer>> kept_;  ///< Until the device has finished with them.
     Expected<void> status_{};
 
     std::uint64_t part_ = 0;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "backends/vulkan/acceleration_structure.h"
 #include "backends/vulkan/buffer.h"
 #include "backends/vulkan/capabilities.h"
 #include "backends/vulkan/memory.h"
@@ -147,6 +148,11 @@ Expected<std::unique_ptr<rhi::BackendComputePipeline>> Device::create_compute_pi
 
 Expected<std::unique_ptr<rhi::BackendQueryPool>> Device::create_query_pool(const rhi::QueryPoolDesc& desc) {
     return QueryPool::create(context_, desc);
+}
+
+Expected<std::unique_ptr<rhi::BackendAccelerationStructure>> Device::create_acceleration_structure(
+    const rhi::AccelerationStructureDesc& desc) {
+    return AccelerationStructure::create(context_, desc);
 }
 
 Expected<void> Device::flush_mapped(rhi::BackendBuffer& buffer) { return native(buffer).memory.flush(); }

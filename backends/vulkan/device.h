@@ -42,6 +42,9 @@ class Device final : public rhi::BackendDevice {
         const rhi::BackendComputePipelineDesc& desc) override;
     Expected<std::unique_ptr<rhi::BackendQueryPool>> create_query_pool(const rhi::QueryPoolDesc& desc) override;
 
+    Expected<std::unique_ptr<rhi::BackendAccelerationStructure>> create_acceleration_structure(
+        const rhi::AccelerationStructureDesc& desc) override;
+
     Expected<void> flush_mapped(rhi::BackendBuffer& buffer) override;
     Expected<void> invalidate_mapped(rhi::BackendBuffer& buffer) override;
 

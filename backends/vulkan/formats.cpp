@@ -163,7 +163,7 @@ VkDescriptorType to_vulkan(rhi::BindingType type) {
         case storage_image:
         case readonly_storage_image:
         case writeonly_storage_image: return VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
-        case acceleration_structure: break;  // No device of this backend offers them.
+        case acceleration_structure: return VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR;
     }
     return VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
 }

@@ -44,6 +44,7 @@ Expected<DeviceFunctions> DeviceFunctions::load(const InstanceFunctions& functio
 #undef NACRE_LOAD
 #define NACRE_LOAD(name) result.name = reinterpret_cast<PFN_vk##name>(functions.GetDeviceProcAddr(device, "vk" #name));
     NACRE_VULKAN_OPTIONAL_DEVICE_FUNCTIONS(NACRE_LOAD)
+    NACRE_VULKAN_RAY_DEVICE_FUNCTIONS(NACRE_LOAD)
 #undef NACRE_LOAD
     return result;
 }

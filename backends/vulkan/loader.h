@@ -58,6 +58,7 @@ namespace nacre::vulkan {
     X(CreateBuffer)                      \
     X(DestroyBuffer)                     \
     X(GetBufferMemoryRequirements2)      \
+    X(GetBufferDeviceAddress)            \
     X(BindBufferMemory)                  \
     X(CreateImage)                       \
     X(DestroyImage)                      \
@@ -145,6 +146,14 @@ namespace nacre::vulkan {
     X(CmdBeginDebugUtilsLabelEXT)                 \
     X(CmdEndDebugUtilsLabelEXT)
 
+/// Missing without VK_KHR_acceleration_structure.
+#define NACRE_VULKAN_RAY_DEVICE_FUNCTIONS(X)    \
+    X(CreateAccelerationStructureKHR)           \
+    X(DestroyAccelerationStructureKHR)          \
+    X(GetAccelerationStructureBuildSizesKHR)    \
+    X(GetAccelerationStructureDeviceAddressKHR) \
+    X(CmdBuildAccelerationStructuresKHR)
+
 #define NACRE_VULKAN_MEMBER(name) PFN_vk##name name = nullptr;
 
 struct GlobalFunctions {
@@ -164,6 +173,7 @@ struct DeviceFunctions {
     NACRE_VULKAN_DEVICE_FUNCTIONS(NACRE_VULKAN_MEMBER)
     NACRE_VULKAN_PROMOTED_DEVICE_FUNCTIONS(NACRE_VULKAN_MEMBER)
     NACRE_VULKAN_OPTIONAL_DEVICE_FUNCTIONS(NACRE_VULKAN_MEMBER)
+    NACRE_VULKAN_RAY_DEVICE_FUNCTIONS(NACRE_VULKAN_MEMBER)
 
     static Expected<DeviceFunctions> load(const InstanceFunctions& functions, VkDevice device);
 };

@@ -229,6 +229,10 @@ Expected<std::unique_ptr<MemoryBlock>> MemoryAllocator::make_block(std::uint32_t
         info.pNext = &owner;
         size = dedicated->requirements.size;  // A dedicated allocation has exactly the size that its object needs.
     }
+    // Any buffer may be one that builds of acceleration structures address.
+    VkMemoryAllocateFlagsInfo addressed{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO, info.pNext};
+    addressed.flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT;
+    if (context_.capabilities.ray_query) info.pNext = &addressed;
     info.allocationSize = size;
     info.memoryTypeIndex = type;
     auto block = std::make_unique<MemoryBlock>(size, type);

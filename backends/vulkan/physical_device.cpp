@@ -85,6 +85,9 @@ Expected<std::vector<std::unique_ptr<PhysicalDevice>>> PhysicalDevice::list(cons
         const bool may_synchronize = core13 || device->has_extension(VK_KHR_SYNCHRONIZATION_2_EXTENSION_NAME);
         const bool may_be_robust = device->has_extension(VK_EXT_ROBUSTNESS_2_EXTENSION_NAME);
         const bool may_choose_lines = device->has_extension(VK_EXT_LINE_RASTERIZATION_EXTENSION_NAME);
+        const bool may_trace = device->has_extension(VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME) &&
+                               device->has_extension(VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME) &&
+                               device->has_extension(VK_KHR_RAY_QUERY_EXTENSION_NAME);
 
         FeatureChain& features = device->features;
         chain(features.core, features.vulkan11);
@@ -94,11 +97,15 @@ Expected<std::vector<std::unique_ptr<PhysicalDevice>>> PhysicalDevice::list(cons
         if (core13) chain(features.core, features.demote);
         if (may_be_robust) chain(features.core, features.robustness2);
         if (may_choose_lines) chain(features.core, features.line_rasterization);
+        if (may_trace) chain(features.core, features.acceleration_structure);
+        if (may_trace) chain(features.core, features.ray_query);
         instance.vk.GetPhysicalDeviceFeatures2(handle, &features.core);
         device->has_dynamic_rendering = features.dynamic_rendering.dynamicRendering;
         device->has_synchronization2 = features.synchronization2.synchronization2;
         device->has_robustness2 = may_be_robust;
         device->has_line_rasterization = features.line_rasterization.bresenhamLines;
+        device->has_ray_query = features.acceleration_structure.accelerationStructure && features.ray_query.rayQuery &&
+                                features.vulkan12.bufferDeviceAddress;
         if (!features.vulkan12.timelineSemaphore || !features.vulkan12.hostQueryReset) {
             refuse("lacks timeline semaphores or host query reset");
             continue;
@@ -108,6 +115,7 @@ Expected<std::vector<std::unique_ptr<PhysicalDevice>>> PhysicalDevice::list(cons
         chain(all, device->vulkan11);
         chain(all, device->vulkan12);
         if (core13) chain(all, device->maintenance4);
+        if (may_trace) chain(all, device->acceleration_structure);
         instance.vk.GetPhysicalDeviceProperties2(handle, &all);
         instance.vk.GetPhysicalDeviceMemoryProperties(handle, &device->memory);
         devices.push_back(std::move(device));

@@ -26,6 +26,10 @@ struct FeatureChain {
     VkPhysicalDeviceLineRasterizationFeaturesEXT line_rasterization{
         VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_LINE_RASTERIZATION_FEATURES_EXT};
 
+    VkPhysicalDeviceAccelerationStructureFeaturesKHR acceleration_structure{
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_FEATURES_KHR};
+    VkPhysicalDeviceRayQueryFeaturesKHR ray_query{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_QUERY_FEATURES_KHR};
+
     FeatureChain() = default;
     FeatureChain(const FeatureChain&) = delete;
     FeatureChain& operator=(const FeatureChain&) = delete;
@@ -51,6 +55,8 @@ class PhysicalDevice {
     VkPhysicalDeviceVulkan11Properties vulkan11{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES};
     VkPhysicalDeviceVulkan12Properties vulkan12{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_PROPERTIES};
     VkPhysicalDeviceMaintenance4Properties maintenance4{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_4_PROPERTIES};
+    VkPhysicalDeviceAccelerationStructurePropertiesKHR acceleration_structure{
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_PROPERTIES_KHR};
     VkPhysicalDeviceMemoryProperties memory{};
     FeatureChain features;
     std::uint32_t queue_family = 0;          ///< Graphics and compute.
@@ -59,6 +65,7 @@ class PhysicalDevice {
     bool has_synchronization2 = false;
     bool has_robustness2 = false;
     bool has_line_rasterization = false;
+    bool has_ray_query = false;  ///< With all that acceleration structures need.
 
   private:
     std::vector<VkExtensionProperties> extensions_;

@@ -120,5 +120,6 @@ Expected<void> run_frame(Bench& bench);
 Expected<void> run_mandelbrot(Bench& bench);
 Expected<void> run_copy(Bench& bench);
 Expected<void> run_compile(Bench& bench);
+Expected<void> run_rays(Bench& bench);
 
 }  // namespace nacre::bench

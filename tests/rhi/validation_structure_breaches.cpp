@@ -75,6 +75,22 @@ std::vector<Breach> structure_breaches() {
         {"N-202", [](Bench& b) { (void)b.device().create_buffer({.size = 16, .usage = input}); }, without},
         {"N-260", [](Bench& b) { (void)b.device().create_acceleration_structure(bottom_desc()); }, without},
         {"N-260", [](Bench& b) { bottom_with(b, [](auto& d) { d.geometries[0].type = GeometryType::curves; }); }},
+        // Boxes with the stride of vertices, with indices, and beside triangles.
+        {"N-262",
+         [](Bench& b) {
+             bottom_with(b,
+                         [](auto& d) { d.geometries.push_back({.type = GeometryType::boxes, .vertex_stride = 24}); });
+         }},
+        {"N-262",
+         [](Bench& b) {
+             bottom_with(b, [](auto& d) { d.geometries = {{.type = GeometryType::boxes, .primitive_count = 1}}; });
+         }},
+        {"N-262",
+         [](Bench& b) {
+             bottom_with(b, [](auto& d) {
+                 d.geometries = {{.type = GeometryType::boxes, .vertex_stride = 24, .index_type = IndexType::uint16}};
+             });
+         }},
         {"N-260",
          [](Bench& b) {
              (void)b.device().create_bind_group_layout(
@@ -85,7 +101,10 @@ std::vector<Breach> structure_breaches() {
         {"N-261", [](Bench& b) { bottom_with(b, [](auto& d) { d.level = AccelerationStructureLevel::top; }); }},
         {"N-262", [](Bench& b) { bottom_with(b, [](auto& d) { d.geometries[0].vertex_stride = 10; }); }},
         {"N-262", [](Bench& b) { bottom_with(b, [](auto& d) { d.geometries[0].primitive_count = 1u << 30; }); }},
-        {"N-262", [](Bench& b) { bottom_with(b, [](auto& d) { d.geometries[0].index_type = {}, d.geometries[0].vertex_count = 2; }); }},
+        {"N-262",
+         [](Bench& b) {
+             bottom_with(b, [](auto& d) { d.geometries[0].index_type = {}, d.geometries[0].vertex_count = 2; });
+         }},
         {"N-322",
          [](Bench& b) {
              (void)b.device().create_bind_group({.layout = b.layout(BindingType::acceleration_structure),
@@ -110,7 +129,8 @@ std::vector<Breach> structure_breaches() {
         {"N-582", [](Bench& b) { build_with(b, [](auto& s) { s.index_offset = 2; }); }},
         {"N-583", [](Bench& b) { build_with(b, [](auto& s) { s.vertex_offset = 224; }); }},
         {"N-584", [](Bench& b) { instance_with(b, [](auto& i) { i.custom_index = 1u << 24; }); }},
-        {"N-584", [](Bench& b) { instance_with(b, [](auto& i) { i.transform[5] = std::numeric_limits<float>::infinity(); }); }},
+        {"N-584",
+         [](Bench& b) { instance_with(b, [](auto& i) { i.transform[5] = std::numeric_limits<float>::infinity(); }); }},
         {"N-584", [](Bench& b) { instance_with(b, [&](auto& i) { i.bottom_level = top(b); }); }},
         {"N-585",
          [](Bench& b) {

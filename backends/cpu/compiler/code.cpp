@@ -201,6 +201,7 @@ class OrcGenerator final : public CodeGenerator {
         define("nacre_cpu_image", image_function(lanes_));
         define("nacre_cpu_ray_proceed", ray_proceed_function());
         define("nacre_cpu_ray_confirm", ray_confirm_function());
+        define("nacre_cpu_ray_generate", ray_generate_function());
         define("nacre_cpu_ray_property", ray_property_function());
         // What LLVM and the functions in double precision call.
         using One = double (*)(double);

@@ -29,6 +29,8 @@
 
 namespace nacre::cpu {
 
+enum class RayStatus : std::uint32_t;
+
 /// One scalar of a value: an LLVM scalar (uniform) or a vector of `lanes` elements.
 struct Component {
     llvm::Value* value = nullptr;
@@ -209,6 +211,12 @@ class Emitter {
     void clear_ray_query(Id variable);
     /// Runs `body` for each different query that the lanes mean.
     void for_each_query(Id pointer, const std::function<void(llvm::Value* query, llvm::Value* lanes_on)>& body);
+    llvm::Value* status_row(RayStatus status);
+    /// Mask of rays that Embree can be given.
+    llvm::Value* traceable(const Value& origin, const Value& direction, const Component& t_min, const Component& t_max);
+    void proceed_query(const Instruction& at);
+    /// RayHints of the lanes of `fresh`, and what goes with them.
+    llvm::Value* proceed_hints(llvm::Value* query, llvm::Value* fresh, llvm::Value*& spread2);
     std::vector<Component> read_query(Id pointer, std::span<const std::size_t> offsets, llvm::Type* scalar);
     std::vector<Component> ray_property(Id pointer, std::uint32_t property, std::uint32_t words, llvm::Type* scalar);
     bool emit_subgroup(const Instruction& at);                          // emit_subgroups.cpp

@@ -29,9 +29,11 @@ struct CallContext {
     RTCIntersectContext context;
 
     /// @param is_coherent  the rays of a packet go about the same way
+    /// @param instance     what hits get as instance that are in none
     /// @param filter       called for each hit of any geometry, or null
-    explicit CallContext(bool is_coherent, Filter filter = nullptr) {
+    CallContext(bool is_coherent, unsigned instance, Filter filter = nullptr) {
         rtcInitIntersectContext(&context);
+        context.instID[0] = instance;
         context.flags = is_coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
         context.filter = filter;
     }
@@ -41,6 +43,13 @@ struct CallContext {
 inline CallContext& context_of(const RTCFilterFunctionNArguments& arguments) {
     return *reinterpret_cast<CallContext*>(arguments.context);
 }
+
+/// The context of the call that meets a geometry of the program's own.
+inline CallContext& context_of(const RTCIntersectFunctionNArguments& arguments) {
+    return *reinterpret_cast<CallContext*>(arguments.context);
+}
+/// The instance that such a geometry is met in.
+inline unsigned instance_of(const RTCIntersectFunctionNArguments& arguments) { return arguments.context->instID[0]; }
 
 inline void intersect(RTCScene scene, CallContext& call, RTCRayHit& ray) { rtcIntersect1(scene, &call.context, &ray); }
 inline void intersect(RTCScene scene, CallContext& call, const int* valid, RTCRayHit4& rays) {

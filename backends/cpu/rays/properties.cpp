@@ -48,8 +48,7 @@ void find_property(const RayQueryLanes* query_pointer, std::uint32_t wanted, std
                 const auto& normal = is_committed ? query.normal : query.candidate_normal;
                 transform(instance.to_object, direction, 0.0f, vector);
                 const float cosine = vector[0] * normal[0][lane] + vector[1] * normal[1][lane] + vector[2] * normal[2][lane];
-                put(0, lane,
-                    std::uint32_t{(cosine > 0) != has_any(instance.flags, rhi::InstanceFlags::flip_facing)});
+                put(0, lane, std::uint32_t{(cosine < 0) != has_any(instance.flags, rhi::InstanceFlags::flip_facing)});
                 break;
             }
             case RayProperty::object_origin:

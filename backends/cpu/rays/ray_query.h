@@ -31,16 +31,24 @@ enum RayFlags : std::uint32_t {
 
 /// What a query of one lane is about to do.
 enum class RayStatus : std::uint32_t {
-    none,      ///< Never initialized: there is nothing to hit.
-    ready,     ///< Initialized; the first Proceed traverses.
-    waiting,   ///< At a candidate; more may follow.
+    none,     ///< Never initialized: there is nothing to hit.
+    ready,    ///< Initialized with a ray that can be traced; the first Proceed traverses.
+    waiting,  ///< At a candidate; more may follow.
     finished,
+};
+
+/// What a candidate is, as bits.
+enum RayCandidateKind : std::uint32_t {
+    ray_candidate_box = 1,     ///< Otherwise a triangle.
+    ray_candidate_opaque = 2,  ///< Of a box.
 };
 
 /// A hit that the shader has to judge.
 struct RayCandidate {
-    float t, u, v;
+    float t;  ///< Where the ray enters a box; its hit is not known.
+    float u, v;
     std::uint32_t primitive, geometry, instance;
+    std::uint32_t kind;  ///< RayCandidateKind
     float normal[3];  ///< Not normalized, in the space of the object: cross(v1 - v0, v2 - v0).
 };
 
@@ -71,6 +79,7 @@ struct alignas(64) RayQueryLanes {
     float candidate_t[max_lanes], candidate_u[max_lanes], candidate_v[max_lanes];
     float candidate_normal[3][max_lanes];
     std::uint32_t candidate_primitive[max_lanes], candidate_geometry[max_lanes], candidate_instance[max_lanes];
+    std::uint32_t candidate_kind[max_lanes];  ///< RayCandidateKind
 
     // Candidates behind it, by rising distance; valid in lanes that wait.
     std::uint32_t next_candidate[max_lanes], candidate_count[max_lanes];
@@ -91,21 +100,44 @@ enum class RayProperty : std::uint32_t {
 inline constexpr std::uint32_t most_property_words = 12;
 inline constexpr std::uint32_t ray_property_committed = 256;  ///< Added to a RayProperty: of the committed hit, not the candidate.
 
-/// What is known of a shader, for `RayProceedFunction`.
+/// What compiled code knows of the lanes that begin, for `RayProceedFunction`. Flags of any of their rays are added,
+/// from the bit `ray_flags_shift` on.
 enum RayHints : std::uint32_t {
-    ray_only_whether_hit = 1,  ///< Nothing but its type is asked of committed hits.
+    ray_only_whether_hit = 1,    ///< Nothing but its type is asked of committed hits.
+    ray_similar_directions = 2,  ///< Of all rays; their origins must be near each other, too, to make them coherent.
+    ray_one_scene = 4,           ///< All lanes have the same scene.
+    ray_all_opaque = 8,          ///< Every ray has `ray_opaque`.
+    ray_all_terminate = 16,      ///< Every ray has `ray_terminate_on_first_hit`.
+    ray_one_by_one = 32,         ///< What a ray hits must not depend on the others.
 };
+inline constexpr std::uint32_t ray_flags_shift = 16;
 
-/// Does what rayQueryProceedEXT does in the lanes of `live`; returns those that stand at a candidate.
-using RayProceedFunction = std::uint32_t (*)(RayQueryLanes* query, std::uint32_t live, std::uint32_t hints);
+/// Directions are similar where the square of the cosine between each and the first is at least this: within 6 degrees.
+/// With wider packets one walk for all rays is slower than Embree's other way (measured with triangles of 1/400 of the
+/// scene's size).
+inline constexpr float smallest_similar_cosine2 = 0.99f;
+
+/// Rays have coordinates up to this, so that Embree, which takes numbers below 1.8e18, gets none larger in the space of
+/// any instance. Compiled code never makes a lane ready whose ray goes beyond, or has a negative or unordered interval:
+/// Embree stops the program at some of these.
+inline constexpr float largest_ray_coordinate = 1e10f;
+
+/// Does what rayQueryProceedEXT does in the lanes of `fresh`, which are ready, and those of `waiting`; returns those
+/// that stand at a candidate now. The caller writes the status.
+/// @param spread2  square of the largest distance between the origin of the first lane of `fresh` and another
+using RayProceedFunction = std::uint32_t (*)(RayQueryLanes* query, std::uint32_t fresh, std::uint32_t waiting,
+                                             std::uint32_t hints, float spread2);
 /// Commits the candidate of the lanes of `live`.
 using RayConfirmFunction = void (*)(RayQueryLanes* query, std::uint32_t live);
+/// Commits a hit in the box that the lanes of `live` stand at, at the distances `t`, an array of max_lanes.
+using RayGenerateFunction = void (*)(RayQueryLanes* query, std::uint32_t live, const float* t);
 /// Writes words of a property, an array of max_lanes for each, for the lanes of `live`; zero where there is no hit.
 using RayPropertyFunction = void (*)(const RayQueryLanes* query, std::uint32_t property, std::uint32_t live,
                                      std::uint32_t* result);
 
 RayProceedFunction ray_proceed_function();
 RayConfirmFunction ray_confirm_function();
+RayGenerateFunction ray_generate_function();
 RayPropertyFunction ray_property_function();
 
 }  // namespace nacre::cpu

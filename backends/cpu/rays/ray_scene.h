@@ -59,6 +59,17 @@ struct RayGeometrySource {
     std::uint64_t index_bytes = 0;
 };
 
+/// Boxes of one geometry.
+struct RayBoxes {
+    struct Box {
+        float lower[3], upper[3];
+        /// Others are never hit, and take the place of a point.
+        [[nodiscard]] bool is_usable() const { return lower[0] <= upper[0]; }
+    };
+    std::vector<Box> boxes;
+    std::array<float, 3> stand_in{};  ///< That point.
+};
+
 /// A bottom level.
 class RayMesh {
   public:
@@ -73,7 +84,9 @@ class RayMesh {
 
     /// Null before the first build.
     [[nodiscard]] RTCSceneTy* scene() const { return scene_; }
-    [[nodiscard]] bool has_triangles() const { return has_triangles_; }
+    [[nodiscard]] bool has_primitives() const { return has_triangles_ || has_boxes_; }
+    [[nodiscard]] bool has_boxes() const { return has_boxes_; }
+    /// Of triangles.
     [[nodiscard]] bool has_opaque() const { return has_opaque_; }
     [[nodiscard]] bool has_non_opaque() const { return has_non_opaque_; }
     [[nodiscard]] bool is_opaque(std::uint32_t geometry) const {
@@ -84,13 +97,17 @@ class RayMesh {
 
   private:
     void start();
-    bool fill(std::size_t index, const RayGeometrySource& source, bool is_update);
+    RTCGeometryTy* attach(std::size_t index);
+    void fill(std::size_t index, const RayGeometrySource& source, bool is_update);
+    void fill_triangles(std::size_t index, const RayGeometrySource& source, bool is_update);
+    void fill_boxes(std::size_t index, const RayGeometrySource& source, bool is_update);
 
     std::shared_ptr<RayDevice> device_;
     std::vector<rhi::GeometryDesc> geometries_;
     std::vector<RTCGeometryTy*> attached_;  ///< Null where a geometry is empty.
+    std::vector<RayBoxes> boxes_;           ///< One for each geometry, empty for triangles.
     RTCSceneTy* scene_ = nullptr;
-    bool allow_update_, has_triangles_ = false, has_opaque_ = false, has_non_opaque_ = false;
+    bool allow_update_, has_triangles_ = false, has_boxes_ = false, has_opaque_ = false, has_non_opaque_ = false;
     rhi::BuildPreference prefer_;
     std::uint64_t bytes_ = 0;
 };
@@ -117,28 +134,30 @@ class RayScene {
 
     /// Null before the first build.
     [[nodiscard]] RTCSceneTy* scene() const { return scene_; }
+    /// What hits get as instance where `scene` is that of a mesh, without instances; else Embree's sign for none.
+    [[nodiscard]] std::uint32_t only_instance() const { return only_instance_; }
     [[nodiscard]] const std::vector<RayInstance>& instances() const { return instances_; }
-    [[nodiscard]] std::uint32_t packet_width() const { return device_->packet_width(); }
+    [[nodiscard]] std::uint32_t packet_width() const { return packet_width_; }
+    /// Rays whose origins are this near to each other (squared) and go the same way are better traced as coherent.
+    [[nodiscard]] float coherent_spread2() const { return coherent_spread2_; }
     /// Some geometry gives candidates unless a ray says otherwise.
     [[nodiscard]] bool has_candidates() const { return has_candidates_; }
     /// Some instance overrules the opacity of its geometry.
     [[nodiscard]] bool has_overrides() const { return has_overrides_; }
+    [[nodiscard]] bool has_boxes() const { return has_boxes_; }
     [[nodiscard]] std::uint64_t bytes() const { return instances_.size() * sizeof(RayInstance); }
 
   private:
     std::shared_ptr<RayDevice> device_;
     std::vector<RayInstance> instances_;
     RTCSceneTy* scene_ = nullptr;
-    bool allow_update_, has_candidates_ = false, has_overrides_ = false;
+    std::uint32_t only_instance_, packet_width_;
+    float coherent_spread2_ = 0;
+    bool allow_update_, has_candidates_ = false, has_overrides_ = false, has_boxes_ = false;
     rhi::BuildPreference prefer_;
 };
 
-/// Rays and instances beyond these are never hit, so that Embree, which takes numbers below 1.8e18, gets none larger in
-/// the space of any object.
-inline constexpr float largest_ray_coordinate = 1e10f;
-inline constexpr float largest_inverse_element = 1e7f;
-inline constexpr float largest_inverse_offset = 1e17f;
-/// Triangles with vertices beyond this are never hit.
+/// Triangles and boxes with coordinates beyond this are never hit.
 inline constexpr float largest_vertex_coordinate = 1e17f;
 
 }  // namespace nacre::cpu

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // How queries meet the scene. Lanes go one of three ways:
 // - Where every hit counts at once, one packet of Embree on the query's own memory.
-// - Where some geometry is not opaque, one packet whose filter collects candidates by the way and lets the ray go on; the shader then
+// - Where some geometry is not opaque, one packet whose filter collects candidates by the way and lets the ray go on;
+// the shader then
 //   gets them by rising distance. Of the candidates of a lane only the nearest `kept_candidates` have room.
-// - Where that room was too small, or a ray or instance overrules opacity or culls, one ray at a time with a filter for all geometry.
-//   It begins behind the last candidate that the shader saw. A single ray gives a triangle the same distance each time, a packet may
-//   not, so what is found here is in one order: that of (distance, instance, geometry, primitive).
+// - Where that room was too small, there are boxes, or a ray or instance overrules opacity or culls, one ray at a time
+// with a filter for all geometry.
+//   It begins behind the last candidate that the shader saw. A single ray gives a triangle the same distance each time,
+//   a packet may not, so what is found here is in one order: that of (distance, instance, geometry, primitive).
 #include "backends/cpu/rays/traversal.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -51,12 +54,12 @@ Kept keep(RayCandidate* list, std::uint32_t& count, const RayCandidate& candidat
 /// A call of Embree, for filters.
 struct Call : embree::CallContext {
     enum class Way { all_count, packet, single };
-    Call(Way how, bool is_coherent, RayQueryLanes& query_, embree::Filter filter = nullptr)
-        : CallContext(is_coherent, filter), way(how), query(query_) {}
+    Call(Way how, bool is_coherent, const RayScene& traced, RayQueryLanes& query_, embree::Filter filter = nullptr)
+        : CallContext(is_coherent, traced.only_instance(), filter), way(how), scene(traced), query(query_) {}
     Way way;
+    const RayScene& scene;
     RayQueryLanes& query;
     // Single rays.
-    const RayScene* scene = nullptr;
     std::uint32_t lane = 0;
     bool has_last = false;
     RayCandidate last{};  ///< Candidates up to this one were seen.
@@ -71,6 +74,7 @@ RayCandidate candidate_of(const RTCFilterFunctionNArguments& arguments, unsigned
             RTCHitN_primID(hit, n, i),
             RTCHitN_geomID(hit, n, i),
             RTCHitN_instID(hit, n, i, 0),
+            0,
             {RTCHitN_Ng_x(hit, n, i), RTCHitN_Ng_y(hit, n, i), RTCHitN_Ng_z(hit, n, i)}};
 }
 
@@ -97,23 +101,36 @@ bool counts_at_once(const RayInstance& instance, std::uint32_t geometry, std::ui
     return instance.mesh->is_opaque(geometry);
 }
 
-/// Of all geometry, for a single ray.
+/// Whether a ray passes by what is opaque, or by what is not.
+bool culls(std::uint32_t ray_flags, bool is_opaque) {
+    return (ray_flags & (is_opaque ? ray_cull_opaque : ray_cull_no_opaque)) != 0;
+}
+
+/// Keeps a candidate of a single ray, unless it was seen before.
+void keep_single(Call& call, const RayCandidate& candidate) {
+    if (call.has_last && order_of(candidate) <= order_of(call.last)) return;
+    RayQueryLanes& query = call.query;
+    if (keep(query.candidates[call.lane], query.candidate_count[call.lane], candidate) == Kept::no_room)
+        query.has_more[call.lane] = 1;
+}
+
+/// Of all triangles, for a single ray.
 void judge(const RTCFilterFunctionNArguments* arguments) {
     auto& call = static_cast<Call&>(embree::context_of(*arguments));
     const std::uint32_t ray_flags = call.query.flags[call.lane];
     for (unsigned i = 0; i < arguments->N; ++i) {
         if (arguments->valid[i] == 0) continue;
         const RayCandidate candidate = candidate_of(*arguments, i);
-        const RayInstance& instance = call.scene->instances()[candidate.instance];
+        const RayInstance& instance = call.scene.instances()[candidate.instance];
         const bool is_opaque = counts_at_once(instance, candidate.geometry, ray_flags);
-        bool is_culled = (ray_flags & (is_opaque ? ray_cull_opaque : ray_cull_no_opaque)) != 0;
+        bool is_culled = culls(ray_flags, is_opaque) || (ray_flags & ray_skip_triangles) != 0;
         if ((ray_flags & (ray_cull_back_facing | ray_cull_front_facing)) != 0 &&
             !has_any(instance.flags, rhi::InstanceFlags::disable_culling)) {
             // The ray that a filter sees is in the space of the object, as the normal is.
             const float cosine = RTCRayN_dir_x(arguments->ray, arguments->N, i) * candidate.normal[0] +
                                  RTCRayN_dir_y(arguments->ray, arguments->N, i) * candidate.normal[1] +
                                  RTCRayN_dir_z(arguments->ray, arguments->N, i) * candidate.normal[2];
-            const bool is_front = (cosine > 0) != has_any(instance.flags, rhi::InstanceFlags::flip_facing);
+            const bool is_front = (cosine < 0) != has_any(instance.flags, rhi::InstanceFlags::flip_facing);
             is_culled = is_culled || (ray_flags & (is_front ? ray_cull_front_facing : ray_cull_back_facing)) != 0;
         }
         if (is_culled) {
@@ -121,46 +138,76 @@ void judge(const RTCFilterFunctionNArguments* arguments) {
             continue;
         }
         if (is_opaque) continue;
-        if (call.has_last && order_of(candidate) <= order_of(call.last)) {
-            arguments->valid[i] = 0;
-            continue;
-        }
-        RayQueryLanes& query = call.query;
-        if (keep(query.candidates[call.lane], query.candidate_count[call.lane], candidate) == Kept::no_room)
-            query.has_more[call.lane] = 1;
+        keep_single(call, candidate);
         arguments->valid[i] = 0;
     }
 }
 
-/// Whether the rays of these lanes go about the same way, so that one walk through the tree serves all of them.
-bool are_coherent(const RayQueryLanes& query, std::uint32_t lanes) {
-    const auto first = static_cast<std::uint32_t>(std::countr_zero(lanes));
-    const float x = query.direction[0][first], y = query.direction[1][first], z = query.direction[2][first];
-    const float length2 = x * x + y * y + z * z;
-    // Squares throughout: the cosine of the largest angle is 0.95.
-    constexpr float smallest_cosine2 = 0.9f;
-    bool result = true;
-    for (std::uint32_t i = 0; i < max_lanes; ++i) {
-        const float dx = query.direction[0][i], dy = query.direction[1][i], dz = query.direction[2][i];
-        const float dot = x * dx + y * dy + z * dz;
-        const bool is_near = dot > 0 && dot * dot >= smallest_cosine2 * length2 * (dx * dx + dy * dy + dz * dz);
-        result = result && (is_near || (lanes >> i & 1) == 0);
-    }
-    return result;
+void bound_box(const RTCBoundsFunctionArguments* arguments) {
+    const auto& all = *static_cast<const RayBoxes*>(arguments->geometryUserPtr);
+    const RayBoxes::Box& box = all.boxes[arguments->primID];
+    const bool is_usable = box.is_usable();
+    const float* lower = is_usable ? box.lower : all.stand_in.data();
+    const float* upper = is_usable ? box.upper : all.stand_in.data();
+    RTCBounds& bounds = *arguments->bounds_o;
+    bounds.lower_x = lower[0], bounds.lower_y = lower[1], bounds.lower_z = lower[2];
+    bounds.upper_x = upper[0], bounds.upper_y = upper[1], bounds.upper_z = upper[2];
 }
 
-/// Lanes whose rays Embree can be given: it stops the program at others.
-std::uint32_t traceable(const RayQueryLanes& query, std::uint32_t lanes) {
-    std::uint32_t good = 0;
-    for (std::uint32_t i = 0; i < max_lanes; ++i) {
-        bool is_good = query.t_min[i] >= 0 && query.t[i] >= query.t_min[i];  // False for what is no number.
-        for (int axis = 0; axis < 3; ++axis)
-            is_good = is_good && std::abs(query.origin[axis][i]) <= largest_ray_coordinate &&
-                      std::abs(query.direction[axis][i]) <= largest_ray_coordinate;
-        good |= std::uint32_t{is_good} << i;
+/// A box that a ray may go through. It shortens no ray: where its hit lies, the shader says.
+void meet_box(const RTCIntersectFunctionNArguments* arguments) {
+    auto& call = static_cast<Call&>(embree::context_of(*arguments));
+    if (call.way != Call::Way::single || arguments->N != 1 || arguments->valid[0] == 0) return;
+    const RayBoxes::Box& box = static_cast<const RayBoxes*>(arguments->geometryUserPtr)->boxes[arguments->primID];
+    const std::uint32_t ray_flags = call.query.flags[call.lane], instance = embree::instance_of(*arguments);
+    if (!box.is_usable() || (ray_flags & ray_skip_boxes) || instance >= call.scene.instances().size()) return;
+    const bool is_opaque = counts_at_once(call.scene.instances()[instance], arguments->geomID, ray_flags);
+    if (culls(ray_flags, is_opaque)) return;
+    RTCRayN* ray = RTCRayHitN_RayN(arguments->rayhit, 1);
+    const float origin[3] = {RTCRayN_org_x(ray, 1, 0), RTCRayN_org_y(ray, 1, 0), RTCRayN_org_z(ray, 1, 0)};
+    const float direction[3] = {RTCRayN_dir_x(ray, 1, 0), RTCRayN_dir_y(ray, 1, 0), RTCRayN_dir_z(ray, 1, 0)};
+    // From where the query begins, not the ray, which may begin behind what was seen: a box must come at the same
+    // distance each time.
+    float enters = call.query.t_min[call.lane], leaves = RTCRayN_tfar(ray, 1, 0);
+    constexpr float rounding = 4 * std::numeric_limits<float>::epsilon();
+    for (int axis = 0; axis < 3; ++axis) {
+        if (direction[axis] == 0) {
+            if (origin[axis] < box.lower[axis] || origin[axis] > box.upper[axis]) return;
+            continue;
+        }
+        const float a = (box.lower[axis] - origin[axis]) / direction[axis],
+                    b = (box.upper[axis] - origin[axis]) / direction[axis];
+        const float near = std::min(a, b), far = std::max(a, b);
+        enters = std::max(enters, near - std::abs(near) * rounding);
+        leaves = std::min(leaves, far + std::abs(far) * rounding);
     }
-    return good & lanes;
+    if (!(enters <= leaves)) return;
+    keep_single(call, {.t = enters,
+                       .u = 0,
+                       .v = 0,
+                       .primitive = arguments->primID,
+                       .geometry = arguments->geomID,
+                       .instance = instance,
+                       .kind = ray_candidate_box | (is_opaque ? std::uint32_t{ray_candidate_opaque} : 0),
+                       .normal = {}});
 }
+
+/// Rays that only ask whether there is a hit pass through boxes; those that may meet some take another way.
+void ignore_box(const RTCOccludedFunctionNArguments*) {}
+
+/// Lanes as Embree takes them.
+struct alignas(64) ValidLanes {
+    explicit ValidLanes(std::uint32_t lanes) {
+        // Compared with single bits, which vectorizes without shifts.
+        constexpr auto bits = [] {
+            std::array<std::uint32_t, max_lanes> result{};
+            for (std::uint32_t i = 0; i < max_lanes; ++i) result[i] = 1u << i;
+            return result;
+        }();
+        for (std::uint32_t i = 0; i < max_lanes; ++i) words[i] = (lanes & bits[i]) == bits[i] ? -1 : 0;
+    }
+    int words[max_lanes];
+};
 
 /// Copies of rays and hits in packets that the machine has natively.
 template <typename Packet, std::uint32_t width>
@@ -213,11 +260,7 @@ void intersect_lanes(const RayScene& scene, Call& call, RayQueryLanes& query, st
         return put_single_hit(rays, lane, ray);
     }
     switch (scene.packet_width()) {
-        case 16: {
-            alignas(64) int valid[16];
-            for (std::uint32_t i = 0; i < 16; ++i) valid[i] = -static_cast<int>(lanes >> i & 1);
-            return embree::intersect(scene.scene(), call, valid, rays);
-        }
+        case 16: return embree::intersect(scene.scene(), call, ValidLanes(lanes).words, rays);
         case 8: return intersect_parts<RTCRayHit8, 8>(scene.scene(), call, rays, lanes);
         default: return intersect_parts<RTCRayHit4, 4>(scene.scene(), call, rays, lanes);
     }
@@ -226,8 +269,6 @@ void intersect_lanes(const RayScene& scene, Call& call, RayQueryLanes& query, st
 /// Traces rays of which nothing is asked but whether they hit.
 void find_whether_hit(const RayScene& scene, Call& call, RayQueryLanes& query, std::uint32_t lanes) {
     RTCRay16& rays = rays_of(query).ray;
-    alignas(64) float t[max_lanes];
-    std::memcpy(t, query.t, sizeof t);
     if (std::has_single_bit(lanes) || scene.packet_width() != 16) {
         for_each_lane(lanes, [&](std::uint32_t lane) {
             RTCRay ray = rtcGetRayFromRayN(reinterpret_cast<RTCRayN*>(&rays), 16, lane);
@@ -235,20 +276,15 @@ void find_whether_hit(const RayScene& scene, Call& call, RayQueryLanes& query, s
             query.t[lane] = ray.tfar;
         });
     } else {
-        alignas(64) int valid[16];
-        for (std::uint32_t i = 0; i < 16; ++i) valid[i] = -static_cast<int>(lanes >> i & 1);
-        embree::occluded(scene.scene(), call, valid, rays);
+        embree::occluded(scene.scene(), call, ValidLanes(lanes).words, rays);
     }
-    for (std::uint32_t i = 0; i < max_lanes; ++i) {
-        if (query.t[i] < 0 && (lanes >> i & 1) != 0) query.geometry[i] = query.primitive[i] = query.instance[i] = 0;
-        query.t[i] = t[i];
-    }
+    // Rays end at minus infinity where they hit, now or earlier; nothing else asks for their lengths.
+    for (std::uint32_t i = 0; i < max_lanes; ++i) query.geometry[i] = query.t[i] < 0 ? 0 : query.geometry[i];
 }
 
 /// The long way for one lane, from behind `last` where there is one.
 void judge_lane(const RayScene& scene, RayQueryLanes& query, std::uint32_t lane, const RayCandidate* last) {
-    Call call(Call::Way::single, false, query, judge);
-    call.scene = &scene;
+    Call call(Call::Way::single, false, scene, query, judge);
     call.lane = lane;
     query.candidate_count[lane] = query.next_candidate[lane] = query.has_more[lane] = 0;
     RTCRayHit ray = single_ray(rays_of(query), lane);
@@ -278,67 +314,78 @@ bool next_candidate(RayQueryLanes& query, std::uint32_t lane) {
     query.candidate_primitive[lane] = candidate.primitive;
     query.candidate_geometry[lane] = candidate.geometry;
     query.candidate_instance[lane] = candidate.instance;
+    query.candidate_kind[lane] = candidate.kind;
     return true;
 }
 
-/// First traversal of lanes of one scene.
-void traverse(const RayScene& scene, RayQueryLanes& query, std::uint32_t lanes, std::uint32_t hints) {
-    lanes = traceable(query, lanes);
-    std::uint32_t packet = 0, collecting = 0, single = 0, terminating = 0;
-    const bool has_candidates = scene.has_candidates(), has_overrides = scene.has_overrides();
-    for_each_lane(lanes, [&](std::uint32_t lane) {
-        const std::uint32_t flags = query.flags[lane], bit = 1u << lane;
-        if (flags & ray_skip_triangles) return;
-        query.candidate_count[lane] = query.next_candidate[lane] = query.has_more[lane] = 0;
-        if (flags & flags_against_packets) single |= bit;
-        else if ((flags & ray_opaque) || (!has_candidates && !has_overrides)) packet |= bit;
-        else if (has_overrides) single |= bit;
-        else collecting |= bit;
-        if (flags & ray_terminate_on_first_hit) terminating |= bit;
-    });
-    if (packet) {
-        Call call(Call::Way::all_count, are_coherent(query, packet), query);
-        if ((hints & ray_only_whether_hit) && (packet & ~terminating) == 0) find_whether_hit(scene, call, query, packet);
-        else intersect_lanes(scene, call, query, packet);
+/// Where every hit counts at once.
+void find_hits(const RayScene& scene, RayQueryLanes& query, std::uint32_t lanes, std::uint32_t hints, float spread2) {
+    const bool is_coherent = (hints & ray_similar_directions) != 0 && spread2 <= scene.coherent_spread2();
+    Call call(Call::Way::all_count, is_coherent, scene, query);
+    const bool asks_only_whether_hit = (hints & ray_only_whether_hit) != 0 && (hints & ray_all_terminate) != 0;
+    if (hints & ray_one_by_one) {
+        for_each_lane(lanes, [&](std::uint32_t lane) { intersect_lanes(scene, call, query, 1u << lane); });
+    } else if (asks_only_whether_hit) {
+        find_whether_hit(scene, call, query, lanes);
+    } else {
+        intersect_lanes(scene, call, query, lanes);
     }
-    if (collecting) {
-        Call call(Call::Way::packet, are_coherent(query, collecting), query);
-        intersect_lanes(scene, call, query, collecting);
-        // Candidates do not shorten a ray, so the nearest ones of all were kept; what follows is found by single rays.
-    }
-    for_each_lane(single, [&](std::uint32_t lane) { judge_lane(scene, query, lane, nullptr); });
 }
 
-std::uint32_t proceed(RayQueryLanes* query_pointer, std::uint32_t live, std::uint32_t hints) {
-    RayQueryLanes& query = *query_pointer;
-    std::uint32_t fresh = 0, waiting = 0;
-    for (std::uint32_t i = 0; i < max_lanes; ++i) {
-        fresh |= std::uint32_t{query.status[i] == static_cast<std::uint32_t>(RayStatus::ready)} << i;
-        waiting |= std::uint32_t{query.status[i] == static_cast<std::uint32_t>(RayStatus::waiting)} << i;
+/// First traversal of lanes of one scene; returns those that may have candidates.
+std::uint32_t traverse(const RayScene& scene, RayQueryLanes& query, std::uint32_t lanes, std::uint32_t hints,
+                       float spread2) {
+    const std::uint32_t flags_of_any = hints >> ray_flags_shift;
+    const bool has_candidates = scene.has_candidates(), has_overrides = scene.has_overrides(),
+               has_boxes = scene.has_boxes();
+    if (!has_boxes && (flags_of_any & (flags_against_packets | ray_skip_triangles)) == 0 &&
+        ((hints & ray_all_opaque) != 0 || (!has_candidates && !has_overrides))) {
+        find_hits(scene, query, lanes, hints, spread2);
+        return 0;
     }
-    fresh &= live;
-    waiting &= live;
-    std::uint32_t result = 0;
-
-    for (std::uint32_t rest = fresh; rest != 0;) {
-        const RayScene* scene = query.scene[std::countr_zero(rest)];
-        std::uint32_t same = 0;
-        for_each_lane(rest, [&](std::uint32_t lane) { same |= std::uint32_t{query.scene[lane] == scene} << lane; });
-        rest &= ~same;
-        const bool can_hit = scene && scene->scene();
-        if (can_hit) traverse(*scene, query, same, hints);
-        for_each_lane(same, [&](std::uint32_t lane) {
-            query.status[lane] = static_cast<std::uint32_t>(RayStatus::finished);
-        });
+    std::uint32_t at_once = 0, collecting = 0, single = 0, asking = 0;
+    for_each_lane(lanes, [&](std::uint32_t lane) {
+        const std::uint32_t flags = query.flags[lane], bit = 1u << lane;
+        query.candidate_count[lane] = query.next_candidate[lane] = query.has_more[lane] = 0;
+        const bool meets_boxes = has_boxes && (flags & ray_skip_boxes) == 0;
+        if ((flags & ray_skip_triangles) && !meets_boxes) return;
+        if (meets_boxes || (flags & flags_against_packets))
+            single |= bit;
+        else if ((flags & ray_opaque) || (!has_candidates && !has_overrides))
+            at_once |= bit;
+        else if (has_overrides || (hints & ray_one_by_one))
+            single |= bit;
+        else
+            collecting |= bit;
         // Only where some geometry, instance or ray asks for it are there lists to look into.
-        std::uint32_t asking = can_hit ? same : 0;
-        for_each_lane(asking, [&](std::uint32_t lane) {
-            if ((query.flags[lane] & ray_no_opaque) == 0 && !scene->has_candidates()) asking &= ~(1u << lane);
-            if (query.flags[lane] & (ray_opaque | ray_skip_triangles)) asking &= ~(1u << lane);
-        });
-        waiting |= traceable(query, asking);
+        if (meets_boxes || (flags & ray_no_opaque) || (has_candidates && (flags & ray_opaque) == 0)) asking |= bit;
+    });
+    if (at_once) find_hits(scene, query, at_once, hints, spread2);
+    if (collecting) {
+        // Candidates do not shorten a ray, so the nearest ones of all are kept; what follows is found by single rays.
+        const bool is_coherent = (hints & ray_similar_directions) != 0 && spread2 <= scene.coherent_spread2();
+        Call call(Call::Way::packet, is_coherent, scene, query);
+        intersect_lanes(scene, call, query, collecting);
     }
+    for_each_lane(single, [&](std::uint32_t lane) { judge_lane(scene, query, lane, nullptr); });
+    return asking;
+}
 
+std::uint32_t proceed(RayQueryLanes* query_pointer, std::uint32_t fresh, std::uint32_t waiting, std::uint32_t hints,
+                      float spread2) {
+    RayQueryLanes& query = *query_pointer;
+    while (fresh != 0) {
+        const RayScene* scene = query.scene[std::countr_zero(fresh)];
+        std::uint32_t same = fresh;
+        if ((hints & ray_one_scene) == 0) {
+            same = 0;
+            for_each_lane(fresh,
+                          [&](std::uint32_t lane) { same |= std::uint32_t{query.scene[lane] == scene} << lane; });
+        }
+        fresh &= ~same;
+        if (scene && scene->scene()) waiting |= traverse(*scene, query, same, hints, spread2);
+    }
+    std::uint32_t result = 0;
     for_each_lane(waiting, [&](std::uint32_t lane) {
         bool has_next = next_candidate(query, lane);
         while (!has_next && query.has_more[lane] != 0) {
@@ -346,24 +393,40 @@ std::uint32_t proceed(RayQueryLanes* query_pointer, std::uint32_t live, std::uin
             judge_lane(*query.scene[lane], query, lane, &last);
             has_next = next_candidate(query, lane);
         }
-        query.status[lane] = static_cast<std::uint32_t>(has_next ? RayStatus::waiting : RayStatus::finished);
         if (has_next) result |= 1u << lane;
     });
     return result;
 }
 
-void confirm(RayQueryLanes* query_pointer, std::uint32_t live) {
-    RayQueryLanes& query = *query_pointer;
+/// Takes the candidate of a lane as the committed hit.
+void commit(RayQueryLanes& query, std::uint32_t lane, float t, std::uint32_t kind) {
+    query.t[lane] = t;
+    query.u[lane] = query.candidate_u[lane], query.v[lane] = query.candidate_v[lane];
+    for (int axis = 0; axis < 3; ++axis) query.normal[axis][lane] = query.candidate_normal[axis][lane];
+    query.primitive[lane] = query.candidate_primitive[lane];
+    query.geometry[lane] = query.candidate_geometry[lane];
+    query.instance[lane] = query.candidate_instance[lane];
+    query.kind[lane] = kind;
+    if (query.flags[lane] & ray_terminate_on_first_hit)
+        query.status[lane] = static_cast<std::uint32_t>(RayStatus::finished);
+}
+
+bool is_at(const RayQueryLanes& query, std::uint32_t lane, bool box) {
+    return query.status[lane] == static_cast<std::uint32_t>(RayStatus::waiting) &&
+           ((query.candidate_kind[lane] & ray_candidate_box) != 0) == box;
+}
+
+void confirm(RayQueryLanes* query, std::uint32_t live) {
     for_each_lane(live, [&](std::uint32_t lane) {
-        if (query.status[lane] != static_cast<std::uint32_t>(RayStatus::waiting)) return;
-        query.t[lane] = query.candidate_t[lane];
-        query.u[lane] = query.candidate_u[lane], query.v[lane] = query.candidate_v[lane];
-        for (int axis = 0; axis < 3; ++axis) query.normal[axis][lane] = query.candidate_normal[axis][lane];
-        query.primitive[lane] = query.candidate_primitive[lane];
-        query.geometry[lane] = query.candidate_geometry[lane];
-        query.instance[lane] = query.candidate_instance[lane];
-        query.kind[lane] = 1;
-        if (query.flags[lane] & ray_terminate_on_first_hit) query.status[lane] = static_cast<std::uint32_t>(RayStatus::finished);
+        if (is_at(*query, lane, false)) commit(*query, lane, query->candidate_t[lane], 1);
+    });
+}
+
+void generate(RayQueryLanes* query, std::uint32_t live, const float* t) {
+    for_each_lane(live, [&](std::uint32_t lane) {
+        // What lies beyond the ray is no hit of it.
+        if (is_at(*query, lane, true) && t[lane] >= query->t_min[lane] && t[lane] <= query->t[lane])
+            commit(*query, lane, t[lane], 2);
     });
 }
 
@@ -374,7 +437,15 @@ void set_candidate_filter(RTCGeometryTy* geometry) {
     rtcSetGeometryOccludedFilterFunction(geometry, collect);
 }
 
+void set_boxes(RTCGeometryTy* geometry, RayBoxes& boxes) {
+    rtcSetGeometryUserData(geometry, &boxes);
+    rtcSetGeometryBoundsFunction(geometry, bound_box, nullptr);
+    rtcSetGeometryIntersectFunction(geometry, meet_box);
+    rtcSetGeometryOccludedFunction(geometry, ignore_box);
+}
+
 RayProceedFunction ray_proceed_function() { return proceed; }
 RayConfirmFunction ray_confirm_function() { return confirm; }
+RayGenerateFunction ray_generate_function() { return generate; }
 
 }  // namespace nacre::cpu
