@@ -146,7 +146,7 @@ class Emitter {
     llvm::Value* mask_bits(llvm::Value* mask);           ///< i32 with one bit for each lane.
     llvm::Value* first_lane(llvm::Value* mask);          ///< i32: the lowest lane that is on (of an empty mask: the highest of all).
     llvm::Value* all_lanes();                            ///< The mask of all lanes.
-    [[nodiscard]] static bool is_all(llvm::Value* mask);
+    [[nodiscard]] static bool is_all(llvm::Value* mask);  ///< A constant that is true in all lanes.
     llvm::Value* both(llvm::Value* mask, llvm::Value* condition);  ///< Mask and condition (scalar or vector).
     llvm::Value* select(llvm::Value* condition, llvm::Value* yes, llvm::Value* no);
     llvm::AllocaInst* make_slot(llvm::Type* type, const char* slot_name);
@@ -272,44 +272,66 @@ class Emitter {
     std::uint64_t workgroup_variable_bytes = 0;
     bool has_side_effects = false;             ///< Some store, atomic or image store was emitted.
 
+    /// What is known of a function before it is emitted.
+    struct Shape {
+        struct BlockShape {
+            bool reconverges = false;            ///< Header: all lanes meet again at the merge block.
+            bool is_reconverged = false;         ///< Merge block of such a header.
+            std::uint32_t divergent_loop = ~0u;  ///< Innermost loop around it that lanes leave one by one: header's index.
+            // Headers of loops:
+            std::uint32_t end = 0;               ///< Index of the first block behind the loop.
+            bool returns_values = false;         ///< Some block of the loop returns from the function.
+            std::vector<std::uint32_t> targets;  ///< Loops that lanes leave one by one: blocks outside that they go to.
+            std::vector<Id> leaving;             ///< The same: values made inside and used outside.
+        };
+        struct Use {
+            std::uint32_t home = 0;              ///< Block that makes the value.
+            std::uint32_t last = 0;              ///< Last block that uses it.
+            bool is_leaving = false;             ///< Used behind a loop that lanes leave one by one, made inside.
+        };
+        std::vector<BlockShape> blocks;
+        std::unordered_map<Id, Use> uses;
+        bool kills = false;                      ///< It, or a function that it calls, ends invocations.
+    };
+    /// What lanes bring along to a block: single static assignment is made as code is emitted, see `merge`.
+    struct Arrival {
+        llvm::Value* reached = nullptr;          ///< i1: some lane comes; null: none can.
+        llvm::Value* mask = nullptr;             ///< Those that come.
+        std::vector<std::vector<llvm::Value*>> phis;  ///< Components of each phi; null: nothing came yet.
+    };
     /// One activation of a function.
     struct Frame {
         const Function* function = nullptr;
+        const Shape* shape = nullptr;
         struct BlockState {
-            llvm::AllocaInst* reached = nullptr;
-            llvm::AllocaInst* mask = nullptr;
-            llvm::AllocaInst* back_reached = nullptr;  ///< Loop headers.
-            llvm::AllocaInst* back_mask = nullptr;
-            std::vector<std::vector<llvm::AllocaInst*>> phi_slots;
+            Arrival arrival, back;               ///< `back`: loop headers, from the end of the loop.
             std::vector<bool> phi_uniform;
-            bool reconverges = false;     ///< Header: all lanes meet again at the merge block.
-            bool is_reconverged = false;  ///< Merge block of such a header.
-            std::uint32_t divergent_loop = ~0u;  ///< Innermost loop around it that lanes leave one by one: header's index.
         };
         std::vector<BlockState> blocks;
         llvm::Value* entry_mask = nullptr;
-        std::unordered_set<Id> crossing;               ///< Ids used in other blocks than their own.
-        std::unordered_set<Id> leaving;                ///< Ids used behind a loop that lanes leave one by one, defined inside.
-        std::vector<llvm::AllocaInst*> return_slots;
-        struct Definition {
-            std::uint32_t block = 0;
-            std::uint64_t chain = 0;
-            std::vector<llvm::AllocaInst*> slots, outside_slots;
-        };
-        std::unordered_map<Id, Definition> definitions;
+        std::vector<llvm::Value*> returned;      ///< Components of the result; null: nothing yet.
         std::unordered_map<Id, Value> values;
-        std::uint32_t block = 0;                       ///< That is being emitted.
-        std::vector<std::uint64_t> chains;             ///< That are open.
+        /// Behind loops that lanes leave one by one: what each lane had when it left.
+        std::unordered_map<Id, std::vector<llvm::Value*>> values_outside;
+        /// Places that hold other values than at the begin of a part of the code that may be skipped.
+        struct Change {
+            llvm::Value** place;
+            llvm::Value* before;                 ///< Null: nothing.
+            llvm::Value* otherwise;              ///< What stands for nothing; null: undefined.
+            std::uint32_t last_use;              ///< Block behind which nobody reads it.
+        };
+        std::vector<Change> changes;
+        std::uint32_t block = 0;                 ///< That is being emitted.
     };
     Frame* frame = nullptr;
     llvm::Value* mask = nullptr;                       ///< Of the block that is being emitted.
     const Instruction* current = nullptr;
-    std::uint64_t chain_count = 0;
     std::uint32_t call_depth = 0;
     bool runs_without_lanes = false;                   ///< The block is cheap: it runs even where its mask is empty.
 
   private:
-    void analyze_frame(Frame& made);
+    const Shape& shape_of(const Function& function);
+    void find_uses(const Function& function, Shape& shape) const;
     void emit_range(std::uint32_t begin, std::uint32_t end);
     std::uint32_t emit_chain(std::uint32_t first, std::uint32_t end);
     void emit_block(std::uint32_t index, llvm::Value* block_mask);
@@ -318,6 +340,13 @@ class Emitter {
     /// condition: null (always), i1 or a vector of i1.
     void emit_edge(std::uint32_t from, Id to, llvm::Value* condition);
     bool is_cheap(std::uint32_t index) const;
+    /// Changes what a place holds from here on, up to and with block `last_use`.
+    void assign(llvm::Value*& place, llvm::Value* value, llvm::Value* otherwise, std::uint32_t last_use);
+    /// Behind code that may have been skipped: places that changed there get a phi. `next` is the block that follows.
+    void merge(std::size_t first_change, llvm::BasicBlock* skipped, llvm::BasicBlock* ran, std::uint32_t next);
+    std::unordered_map<Id, std::unique_ptr<Shape>> shapes_;
+    Id remade_ = 0;                                    ///< Pointer that is being made again behind a loop,
+    Value remade_value_;                               ///< and what it is there.
     std::unordered_map<Id, Value> constants_;
     std::unordered_map<std::string, llvm::Value*> shared_;
 };
