@@ -100,6 +100,11 @@ void ComputeEmitter::emit_subgroup_body(llvm::Value* subgroup) {
     emit_function(module.entry(), {}, entry_mask);
 }
 
+void ComputeEmitter::add_stage_values(std::vector<llvm::Value**>& places) {
+    places.insert(places.end(), {&range, &memory, &group_x, &subgroup_index});
+    for (Component& axis : local_id) places.insert(places.end(), {&axis.value, &axis.linear_base});
+}
+
 void ComputeEmitter::emit_plain_kernel() {
     auto* type = llvm::FunctionType::get(builder.getVoidTy(), {pointer_type, pointer_type}, false);
     function_ = llvm::Function::Create(type, llvm::Function::ExternalLinkage, "kernel", target);

@@ -217,15 +217,15 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
             return {all};
         }
         case Op::OpSelect: {
-            if (module.type(type_id).kind == TypeKind::pointer) reject("pointers that depend on a condition are not supported");
-            const Value condition = get(operands[0]), yes = get(operands[1]), no = get(operands[2]);
+            const Value condition = get(operands[0]);
+            const std::vector<Component> yes = get_components(operands[1]), no = get_components(operands[2]);
             std::vector<Component> made;
-            for (std::size_t i = 0; i < yes.components.size(); ++i) {
+            for (std::size_t i = 0; i < yes.size(); ++i) {
                 const Component& which = condition.components.size() == 1 ? condition.components[0] : condition.components.at(i);
-                if (which.is_uniform() && !(yes.components[i].is_uniform() && no.components.at(i).is_uniform()))
-                    made.emplace_back(select(which.value, widen(yes.components[i]), widen(no.components.at(i))));
+                if (which.is_uniform() && !(yes[i].is_uniform() && no.at(i).is_uniform()))
+                    made.emplace_back(select(which.value, widen(yes[i]), widen(no.at(i))));
                 else
-                    made.push_back(apply({which, yes.components[i], no.components.at(i)},
+                    made.push_back(apply({which, yes[i], no.at(i)},
                                          [&](Values v) { return select(v[0], v[1], v[2]); }));
             }
             return made;

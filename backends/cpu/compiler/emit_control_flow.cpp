@@ -78,10 +78,17 @@ const Emitter::Shape& Emitter::shape_of(const Function& function) {
 
 void Emitter::find_uses(const Function& function, Shape& shape) const {
     const auto count = static_cast<std::uint32_t>(function.blocks.size());
+    const auto is_remade = [&](const Instruction& at) {
+        if (!at.type || !module.has_type(at.type)) return false;
+        const Type& type = module.type(at.type);
+        // Pointers that depend on control flow are values.
+        const bool is_value = at.op == Op::OpSelect || at.op == Op::OpLoad || at.op == Op::OpFunctionCall || at.op == Op::OpCompositeExtract;
+        return type.is_opaque() || (type.kind == TypeKind::pointer && !is_value);
+    };
     for (std::uint32_t i = 0; i < count; ++i) {
-        for (const Instruction& at : function.blocks[i].phis) shape.uses[at.result] = {i, i};
+        for (const Instruction& at : function.blocks[i].phis) shape.uses[at.result] = {i, i, false, false};
         for (const Instruction& at : function.blocks[i].body)
-            if (at.result) shape.uses[at.result] = {i, i};
+            if (at.result) shape.uses[at.result] = {i, i, false, is_remade(at)};
     }
     const auto use = [&](Id id, std::uint32_t block) {
         const auto found = shape.uses.find(id);
@@ -105,8 +112,7 @@ void Emitter::find_uses(const Function& function, Shape& shape) const {
         for (auto at = function.blocks[i].body.rbegin(); at != function.blocks[i].body.rend(); ++at) {
             if (!at->result || !at->type) continue;
             const Shape::Use& made = shape.uses.at(at->result);
-            const Type& type = module.type(at->type);
-            if (!made.is_leaving || (type.kind != TypeKind::pointer && !type.is_opaque())) continue;
+            if (!made.is_leaving || !made.is_remade) continue;
             const std::uint32_t last = made.last;
             for (const std::uint32_t operand : at->operands) {
                 const auto found = shape.uses.find(operand);
@@ -166,7 +172,7 @@ std::vector<Component> Emitter::emit_function(const Function& callee, const std:
             const Type& type = module.type(phi.type);
             if (type.components == 0) {
                 current = &phi;
-                reject("pointers that depend on control flow (variable pointers) are not supported");
+                reject("images and pointers to what is no buffer cannot depend on control flow");
             }
             state.phi_uniform.push_back(!uniformity.is_divergent(phi.result));
             state.arrival.phis.emplace_back(type.components, nullptr);
@@ -344,7 +350,7 @@ void Emitter::emit_loop_body(std::uint32_t header, std::uint32_t end, llvm::Valu
         }
         for (const Id id : shape.leaving) {
             const Type& type = module.type(module.type_of(id));
-            if (type.components == 0) continue;
+            if (type.components == 0 || frame->shape->uses.at(id).is_remade) continue;
             std::vector<llvm::Value*>& places = frame->values_outside[id];
             places.resize(type.components);
             std::uint32_t index = 0;
@@ -397,6 +403,14 @@ void Emitter::emit_block(std::uint32_t index, llvm::Value* block_mask) {
             if (!value) value = llvm::UndefValue::get(state.phi_uniform[i] ? kind : vector_of(kind));
             components.emplace_back(value);
         });
+        if (module.type(block.phis[i].type).kind == TypeKind::pointer) {
+            Id origin = 0;
+            for (std::size_t k = 0; k < block.phis[i].operands.size() && !origin; k += 2)
+                if (module.variable(block.phis[i].operands[k]) || frame->values.contains(block.phis[i].operands[k]))
+                    origin = block.phis[i].operands[k];
+            set_pointer(block.phis[i], std::move(components), origin);
+            continue;
+        }
         define(block.phis[i].result).components = std::move(components);
         finish_definition(block.phis[i].result);
     }
@@ -452,9 +466,9 @@ void Emitter::emit_terminator(std::uint32_t index) {
             return;
         }
         case Op::OpReturnValue: {
-            const Value value = get(end.operand(0));
+            const std::vector<Component> value = get_components(end.operand(0));
             for (std::size_t i = 0; i < frame->returned.size(); ++i) {
-                llvm::Value* all = widen(value.components.at(i));
+                llvm::Value* all = widen(value.at(i));
                 llvm::Value* before = frame->returned[i];
                 assign(frame->returned[i], before ? select(mask, all, before) : all, nullptr, ~0u);
             }
@@ -466,6 +480,7 @@ void Emitter::emit_terminator(std::uint32_t index) {
                 llvm::Value* none = llvm::Constant::getNullValue(mask_type);
                 store_live(builder.CreateSelect(mask, none, live()));
             }
+            if (killed_slot) builder.CreateStore(builder.CreateOr(mask, builder.CreateLoad(mask_type, killed_slot)), killed_slot);
             return;
         case Op::OpReturn:
         case Op::OpUnreachable:
@@ -484,7 +499,11 @@ void Emitter::emit_edge(std::uint32_t from, Id to, llvm::Value* condition) {
     Arrival& arrival = is_back ? state.back : state.arrival;
     const std::uint32_t last_use = is_back ? frame->shape->blocks[*target_index].end : *target_index;
     llvm::Value* edge_mask = both(mask, condition);
-    llvm::Value* taken = !condition                          ? runs_without_lanes ? any(mask) : builder.getTrue()
+    // Lanes that ended inside of a function that was called here do not go round for ever.
+    const bool may_end = is_back && killed_slot;
+    if (may_end) edge_mask = both(edge_mask, builder.CreateNot(builder.CreateLoad(mask_type, killed_slot)));
+    llvm::Value* taken = may_end                            ? any(edge_mask)
+                         : !condition                          ? runs_without_lanes ? any(mask) : builder.getTrue()
                          : condition->getType()->isVectorTy() ? any(edge_mask)
                                                              : condition;
 
@@ -494,8 +513,7 @@ void Emitter::emit_edge(std::uint32_t from, Id to, llvm::Value* condition) {
         const Instruction& phi = block.phis[i];
         for (std::size_t k = 0; k + 1 < phi.operands.size(); k += 2) {
             if (phi.operands[k + 1] != function.blocks[from].id) continue;
-            const Value value = get(phi.operands[k]);
-            for (const Component& component : value.components)
+            for (const Component& component : get_components(phi.operands[k]))
                 incoming[i].push_back(state.phi_uniform[i] ? narrow(component, edge_mask) : widen(component));
             break;
         }
@@ -513,7 +531,7 @@ void Emitter::emit_edge(std::uint32_t from, Id to, llvm::Value* condition) {
     // Where all lanes of the header meet again nothing needs to be counted.
     if (frame->shape->blocks[*target_index].is_reconverged && !is_back) return;
     // One way in: the mask counts only if the block is reached, so a scalar condition need not clear it.
-    const bool is_plain = !arrival.reached && block.predecessors.size() == 1 && condition && !condition->getType()->isVectorTy();
+    const bool is_plain = !arrival.reached && !may_end && block.predecessors.size() == 1 && condition && !condition->getType()->isVectorTy();
     llvm::Value* lanes_coming = is_plain ? mask : edge_mask;
     const bool is_first = !arrival.reached;
     assign(arrival.reached, is_first ? taken : builder.CreateOr(arrival.reached, taken), builder.getFalse(), last_use);

@@ -41,11 +41,13 @@ Value Emitter::constant(Id id) {
             break;
         case Op::OpSpecConstantOp:
             value.components = evaluate(static_cast<Op>(at.operand(0)), at.type, at.operands.subspan(1), id);
+            // Instructions stand for it only here.
+            for (const Component& component : value.components)
+                if (!llvm::isa<llvm::Constant>(component.value)) return value;
             break;
         case Op::OpUndef:
         case Op::OpConstantNull:
         default:
-            if (type.kind == TypeKind::pointer) reject("null pointers are not supported");
             for_each_component_type(at.type, [&](const Type& scalar) { value.components.push_back(zero(scalar)); });
     }
     constants_.emplace(id, value);
@@ -68,12 +70,11 @@ Value Emitter::get(Id id) {
     const std::uint32_t loop = frame->shape->blocks[use->second.home].divergent_loop;
     if (frame->block >= loop && frame->block < frame->shape->blocks[loop].end) return found->second;
     Value value = found->second;
-    if (!value.components.empty()) {
+    if (!use->second.is_remade) {
         const std::vector<llvm::Value*>& outside = frame->values_outside.at(id);
         for (std::size_t i = 0; i < value.components.size(); ++i) value.components[i] = Component(outside.at(i));
         return value;
     }
-    if (!value.pointer && !value.image && !value.sampler) return value;
     // Made again here, where its operands have the values that each lane left the loop with.
     for (const Instruction& at : frame->function->blocks[use->second.home].body) {
         if (at.result != id) continue;
@@ -88,6 +89,29 @@ Value Emitter::get(Id id) {
     reject("a pointer is used where it cannot be made again");
 }
 
+Pointer Emitter::get_pointer(Id id) {
+    const Value value = get(id);
+    if (value.pointer) return *value.pointer;
+    const Type& type = module.type(module.type_of(id));
+    if (type.kind != TypeKind::pointer || value.components.size() != 3) reject("a pointer is expected and something else is found");
+    Pointer pointer;
+    pointer.storage = type.storage, pointer.type = type.element;
+    pointer.base = apply({value.components[0]}, [&](auto v) { return builder.CreateIntToPtr(v[0], like(v[0], pointer_type)); });
+    pointer.limit = value.components[1];
+    pointer.dynamic_offset = value.components[2];
+    pointer.needs_limit_check = true;
+    if (value.origin) {
+        pointer.row_major = value.origin->row_major, pointer.matrix_stride = value.origin->matrix_stride;
+        pointer.component_stride = value.origin->component_stride;
+    }
+    return pointer;
+}
+
+std::vector<Component> Emitter::get_components(Id id) {
+    Value value = get(id);
+    return value.pointer ? components_of(*value.pointer) : std::move(value.components);
+}
+
 void Emitter::set(const Instruction& at, std::vector<Component> components) {
     // What the analysis holds for uniform is kept as a scalar, so that slots and branches can rely on it.
     if (!uniformity.is_divergent(at.result))
@@ -95,6 +119,14 @@ void Emitter::set(const Instruction& at, std::vector<Component> components) {
             if (!component.is_uniform()) component = Component(narrow(component, mask));
     define(at.result).components = std::move(components);
     finish_definition(at.result);
+}
+
+void Emitter::set_pointer(const Instruction& at, std::vector<Component> components, Id origin) {
+    if (origin) {
+        const Value from = get(origin);
+        define(at.result).origin = from.pointer ? from.pointer : from.origin;
+    }
+    set(at, std::move(components));
 }
 
 void Emitter::finish_definition(Id id) {
@@ -112,12 +144,12 @@ void Emitter::finish_definition(Id id) {
     if (value.pointer) {
         auto own = std::make_shared<Pointer>(*value.pointer);
         for (Component* part : {&own->valid, &own->dynamic_component, &own->base, &own->limit, &own->dynamic_offset, &own->descriptor_index,
-                                &own->image_descriptor, &own->sample})
+                                &own->descriptor_address, &own->image_descriptor, &own->sample})
             keep(*part);
         for (Component& coordinate : own->coordinates) keep(coordinate);
         value.pointer = std::move(own);
     }
-    if (!use->second.is_leaving) return;
+    if (!use->second.is_leaving || use->second.is_remade) return;
     // Lanes that have left the loop keep what they had.
     std::vector<llvm::Value*>& outside = frame->values_outside[id];
     outside.resize(value.components.size());

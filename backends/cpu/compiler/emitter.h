@@ -79,6 +79,7 @@ struct Pointer {
     // Kind::descriptor: one element or an array of them.
     std::uint32_t set = 0, binding = 0;
     Component descriptor_index;      ///< i32; null: 0.
+    Component descriptor_address;    ///< ptr, instead of set, binding and index: what a function was given.
 
     // Kind::texel
     Component image_descriptor;
@@ -93,6 +94,8 @@ struct Value {
     std::shared_ptr<const Pointer> pointer;
     Component image, sampler;        ///< Images, samplers, sampled images: ptr to Descriptor.
     Id image_type = 0;
+    /// Pointers that depend on control flow: one of those that they may be, for the layout of matrices.
+    std::shared_ptr<const Pointer> origin;
 };
 
 /// What went wrong, thrown inside of the emitter only and turned into an Error at its surface.
@@ -169,6 +172,8 @@ class Emitter {
     Value& define(Id id);
     Value get(Id id);
     Component get_scalar(Id id) { return get(id).components.at(0); }
+    Pointer get_pointer(Id id);
+    std::vector<Component> get_components(Id id);        ///< Of pointers too.
     Value constant(Id id);
     Component zero(const Type& scalar);
     void set(const Instruction& at, std::vector<Component> components);
@@ -177,6 +182,11 @@ class Emitter {
     // ---- Control flow (emit_control_flow.cpp)
     /// Emits a function for the lanes of `mask`; returns its result.
     std::vector<Component> emit_function(const Function& function, const std::vector<Value>& arguments, llvm::Value* mask);
+
+    // ---- Functions that are called and not emitted in place (emit_calls.cpp)
+    void emit_call(const Instruction& at);
+    void share_environment();                            ///< When everything that functions may use has been made.
+    virtual void add_stage_values(std::vector<llvm::Value**>&) {}  ///< What a stage keeps in members and functions may use.
 
     // ---- Instructions
     void emit_instruction(const Instruction& at);                       // emit_instruction.cpp
@@ -218,9 +228,13 @@ class Emitter {
     void declare_variables();
     LaneVariable& make_lane_variable(Id variable_id, Id type, bool is_uniform);
     void fill(LaneVariable& variable, const std::vector<Component>& values);
+    void hold_constant(LaneVariable& variable, Id content);  ///< Memory of the module that nobody writes.
     std::vector<Component> load(const Pointer& pointer);
     void store(const Pointer& pointer, const std::vector<Component>& values);
     Pointer pointer_to(Id variable);
+    std::vector<Component> components_of(const Pointer& pointer);
+    void set_pointer(const Instruction& at, std::vector<Component> components, Id origin);
+    Pointer step(Pointer pointer, const Type& pointer_kind, Id index);  ///< As many elements on as the index says.
     Pointer access(Pointer pointer, Id index);
     Component load_bytes(const Pointer& pointer, std::int64_t extra, const Type& scalar);
     void store_bytes(const Pointer& pointer, std::int64_t extra, const Type& scalar, const Component& value);
@@ -263,12 +277,13 @@ class Emitter {
     llvm::Value* shader_context = nullptr;     ///< ptr to ShaderContext
     llvm::Function* function_ = nullptr;       ///< That is being made.
     llvm::BasicBlock* slot_block = nullptr;    ///< Where stack slots are made.
-    llvm::AllocaInst* live_slot = nullptr;     ///< Lanes that are neither helpers nor discarded.
+    llvm::Value* live_slot = nullptr;          ///< ptr to lanes that are neither helpers nor discarded.
+    llvm::Value* killed_slot = nullptr;        ///< ptr to lanes that ended inside of functions; null: none can.
     llvm::AllocaInst* nowhere_slot = nullptr;  ///< Where stores go that must vanish.
     llvm::AllocaInst* image_arguments = nullptr;
     std::unordered_map<Id, std::unique_ptr<LaneVariable>> lane_variables;
     std::unordered_map<Id, std::uint64_t> workgroup_offsets;
-    std::unordered_map<Id, llvm::AllocaInst*> ray_queries;
+    std::unordered_map<Id, llvm::Value*> ray_queries;
     std::uint64_t workgroup_variable_bytes = 0;
     bool has_side_effects = false;             ///< Some store, atomic or image store was emitted.
 
@@ -288,10 +303,10 @@ class Emitter {
             std::uint32_t home = 0;              ///< Block that makes the value.
             std::uint32_t last = 0;              ///< Last block that uses it.
             bool is_leaving = false;             ///< Used behind a loop that lanes leave one by one, made inside.
+            bool is_remade = false;              ///< A pointer or image: behind such loops made again from its operands.
         };
         std::vector<BlockShape> blocks;
         std::unordered_map<Id, Use> uses;
-        bool kills = false;                      ///< It, or a function that it calls, ends invocations.
     };
     /// What lanes bring along to a block: single static assignment is made as code is emitted, see `merge`.
     struct Arrival {
@@ -347,6 +362,18 @@ class Emitter {
     std::unordered_map<Id, std::unique_ptr<Shape>> shapes_;
     Id remade_ = 0;                                    ///< Pointer that is being made again behind a loop,
     Value remade_value_;                               ///< and what it is there.
+    std::unordered_map<Id, llvm::Function*> kept_;     ///< Functions that have been made.
+    std::vector<llvm::Value**> shared_places_;         ///< What functions may use,
+    llvm::StructType* environment_type_ = nullptr;     ///< in the order of this structure,
+    llvm::Value* environment_ = nullptr;               ///< of which every function gets the address.
+    struct Argument {
+        std::vector<llvm::Value*> values;              ///< Of `argument_types`.
+        bool fits = true;                              ///< Can be handed to a function.
+    };
+    std::vector<llvm::Type*> argument_types(const Instruction& parameter);
+    Argument argument(const Instruction& parameter, Id id);
+    Value parameter_value(const Instruction& parameter, std::span<llvm::Value* const> values);
+    llvm::Function* kept_function(const Function& callee);
     std::unordered_map<Id, Value> constants_;
     std::unordered_map<std::string, llvm::Value*> shared_;
 };

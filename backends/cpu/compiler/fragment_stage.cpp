@@ -186,7 +186,7 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
             const std::uint32_t number = at.operand(1);
             if (number != GLSLstd450InterpolateAtCentroid && number != GLSLstd450InterpolateAtSample && number != GLSLstd450InterpolateAtOffset)
                 return false;
-            const Pointer pointer = *get(at.operand(2)).pointer;
+            const Pointer pointer = get_pointer(at.operand(2));
             Place place = centroid;
             if (number == GLSLstd450InterpolateAtOffset) {
                 const Value offset = get(at.operand(3));
@@ -258,6 +258,11 @@ void FragmentEmitter::store_outputs() {
         }
     }
     builder.CreateAlignedStore(mask_bits(live()), at_offset(batch, offsetof(FragmentBatch, live)), llvm::Align(4));
+}
+
+void FragmentEmitter::add_stage_values(std::vector<llvm::Value**>& places) {
+    places.insert(places.end(), {&batch, &pixel_x, &pixel_y, &center.x, &center.y, &centroid.x, &centroid.y});
+    for (llvm::Value*& primitive : primitives) places.push_back(&primitive);
 }
 
 void FragmentEmitter::emit() {

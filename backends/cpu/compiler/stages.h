@@ -21,6 +21,7 @@ class ComputeEmitter final : public Emitter {
     bool emit_stage(const Instruction& at) override;
     std::vector<Component> input_components(const Variable& variable) override;
     llvm::Value* workgroup_memory() override { return memory; }
+    void add_stage_values(std::vector<llvm::Value**>& places) override;
     void emit_subgroup_body(llvm::Value* subgroup);
     void emit_plain_kernel();
     void emit_suspending_kernel();
@@ -43,6 +44,7 @@ class VertexEmitter final : public Emitter {
     Component fetch(const rhi::VertexAttribute& attribute, std::uint32_t component, const Type& scalar);
     void emit_batch();
     void store_outputs();
+    void add_stage_values(std::vector<llvm::Value**>& places) override;
     const VertexInput& input_;
     llvm::Value *draw = nullptr, *batch = nullptr, *indices = nullptr, *instance = nullptr;
 };
@@ -69,6 +71,7 @@ class FragmentEmitter final : public Emitter {
     void emit_batch();
     void store_outputs();
     void declare_inputs();
+    void add_stage_values(std::vector<llvm::Value**>& places) override;
     llvm::Value* batch = nullptr;
     std::array<llvm::Value*, max_quads> primitives{};
     llvm::Value *pixel_x = nullptr, *pixel_y = nullptr;  ///< Float, left upper corner of each lane's pixel.

@@ -199,6 +199,10 @@ void VertexEmitter::store_outputs() {
     std::ranges::sort(program.outputs, {}, [](const VertexOutput& at) { return std::pair(at.location, at.component); });
 }
 
+void VertexEmitter::add_stage_values(std::vector<llvm::Value**>& places) {
+    places.insert(places.end(), {&draw, &batch, &indices, &instance});
+}
+
 void VertexEmitter::emit() {
     emit_batches(3, sizeof(VertexBatch), [&](llvm::Value* one) {
         batch = one;
