@@ -17,6 +17,8 @@ namespace {
 
 /// Scalars of a variable up to which each load and store names its slots one by one.
 constexpr std::uint32_t most_direct_components = 4096;
+/// Threads of schedulers have a few MiB of stack.
+constexpr std::uint64_t most_stack_bytes = 2 << 20, most_stack_bytes_of_one = 64 << 10;
 
 }  // namespace
 
@@ -35,6 +37,11 @@ LaneVariable& Emitter::make_lane_variable(Id variable_id, Id type_id, bool is_un
         const std::uint64_t bytes = std::uint64_t{type.components} * made->slot_bytes * (is_uniform ? 1 : lanes);
         if (bytes > (1u << 24))
             reject(fmt::format("a variable of {} scalars takes {} bytes for {} lanes; 16 MiB is the most", type.components, bytes, lanes));
+        if (bytes > most_stack_bytes_of_one) made->memory = large_memory(bytes);
+        if (made->memory) return *made;
+        stack_bytes += bytes;
+        if (stack_bytes > most_stack_bytes && !is_on_heap())
+            reject(fmt::format("the variables take {} bytes of stack for {} lanes; {} is the most", stack_bytes, lanes, most_stack_bytes));
         made->memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::max<std::uint64_t>(bytes, 1)), "variable");
     }
     return *made;

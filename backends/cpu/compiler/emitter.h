@@ -259,6 +259,10 @@ class Emitter {
     // ---- Stages: what only they know.
     virtual std::vector<Component> input_components(const Variable& variable) = 0;
     /// Base pointer and size of the workgroup's memory.
+    /// Memory for a large variable that is no stack; null: there is none.
+    virtual llvm::Value* large_memory(std::uint64_t) { return nullptr; }
+    /// Stack slots of the function that is being made lie in memory that was measured before.
+    [[nodiscard]] virtual bool is_on_heap() const { return false; }
     virtual llvm::Value* workgroup_memory() { reject("workgroup memory outside of a compute shader"); }
     void store_live(llvm::Value* lanes_on) { builder.CreateStore(lanes_on, live_slot); }
     llvm::Value* live() { return builder.CreateLoad(mask_type, live_slot); }
@@ -285,6 +289,7 @@ class Emitter {
     std::unordered_map<Id, std::uint64_t> workgroup_offsets;
     std::unordered_map<Id, llvm::Value*> ray_queries;
     std::uint64_t workgroup_variable_bytes = 0;
+    std::uint64_t stack_bytes = 0;             ///< Of variables, all together.
     bool has_side_effects = false;             ///< Some store, atomic or image store was emitted.
 
     /// What is known of a function before it is emitted.

@@ -85,7 +85,7 @@ void FragmentEmitter::declare_inputs() {
         const auto scalars = interface_scalars(module, *variable);
         if (!scalars) {
             current = &variable->instruction;
-            reject(fmt::format("input '{}' has no location, or holds 64-bit values", variable->name));
+            reject(fmt::format("input '{}' has no location", variable->name));
         }
         std::vector<std::uint32_t>& numbers = input_numbers_[id];
         for (const InterfaceScalar& at : *scalars) {
@@ -96,6 +96,10 @@ void FragmentEmitter::declare_inputs() {
             program.runs_per_sample = program.runs_per_sample || (at.sample && !is_flat);
             program.uses_centroid = program.uses_centroid || (at.centroid && !is_flat);
             numbers.push_back(static_cast<std::uint32_t>(program.inputs.size()));
+            if (at.is_wide) input.interpolation = Interpolation::flat;
+            program.inputs.push_back(input);
+            if (!at.is_wide) continue;
+            input.location = at.upper_location, input.component = at.upper_component;
             program.inputs.push_back(input);
         }
     }
@@ -154,6 +158,15 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
     std::vector<Component> made;
     for (std::size_t i = 0; i < scalars->size(); ++i) {
         const InterfaceScalar& at = (*scalars)[i];
+        if (at.is_wide) {
+            const auto half = [&](std::uint32_t number) {
+                llvm::Value* word = primitive_word(sizeof(PrimitiveData) + number * sizeof(Plane), builder.getInt32Ty()).value;
+                return builder.CreateZExt(word, vector_of(builder.getInt64Ty()));
+            };
+            llvm::Value* bits = builder.CreateOr(half(numbers->second[i]), builder.CreateShl(half(numbers->second[i] + 1), 32));
+            made.emplace_back(builder.CreateBitCast(bits, vector_of(scalar_type(module.type(at.type)))));
+            continue;
+        }
         made.push_back(evaluate_input(numbers->second[i], at.centroid && !program.runs_per_sample ? centroid : center, module.type(at.type)));
     }
     return made;
@@ -245,7 +258,8 @@ void FragmentEmitter::store_outputs() {
             continue;
         }
         const auto scalars = interface_scalars(module, *variable);
-        if (!scalars) reject(fmt::format("output '{}' has no location, or holds 64-bit values", variable->name));
+        if (!scalars || module.type(variable->type).has_wide)
+            reject(fmt::format("output '{}' has no location, or holds 64-bit values", variable->name));
         for (std::size_t i = 0; i < scalars->size(); ++i) {
             const InterfaceScalar& at = (*scalars)[i];
             const std::uint32_t output = variable->index == 1 ? dual_source_output + at.location : at.location;

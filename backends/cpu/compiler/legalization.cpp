@@ -22,6 +22,8 @@ using spv::Op;
 constexpr std::uint64_t most_inlined_instructions = 30'000;
 /// Functions that are kept are at least so large; a call costs about as much as a smaller one.
 constexpr std::uint64_t kept_sizes[] = {4'000, 1'000, 250, 60};
+/// Blocks up to which SPIRV-Tools makes values of variables: it takes time by the square of their number. LLVM does it for others.
+constexpr std::uint64_t most_rewritten_blocks = 3'000;
 /// Where even that does not help (functions with barriers are always inlined).
 constexpr std::uint64_t most_instructions = 2'000'000;
 
@@ -36,7 +38,8 @@ class InliningPlan {
         FunctionSize* function = nullptr;
         for (const rhi::spirv::Instruction& at : rhi::spirv::instructions(words)) {
             const Op op = static_cast<Op>(at.opcode());
-            if (function) ++function->own;
+            if (function) ++function->own, ++own_instructions_;
+            if (op == Op::OpLabel) ++own_blocks_;
             switch (op) {
                 case Op::OpEntryPoint: entries.push_back(at.operand(1)); break;
                 case Op::OpTypeArray: case Op::OpTypeRuntimeArray: case Op::OpTypeRayQueryKHR: case Op::OpTypeImage: case Op::OpTypeSampler:
@@ -85,6 +88,9 @@ class InliningPlan {
 
     /// What is left to compile.
     [[nodiscard]] std::uint64_t instructions() const { return instructions_; }
+
+    /// Basic blocks in it, about.
+    [[nodiscard]] std::uint64_t blocks() const { return own_blocks_ * instructions_ / std::max<std::uint64_t>(own_instructions_, 1); }
 
     void apply(std::vector<std::uint32_t>& words) const {
         constexpr auto dont_inline = static_cast<std::uint32_t>(spv::FunctionControlMask::DontInline);
@@ -139,7 +145,7 @@ class InliningPlan {
 
     std::unordered_map<std::uint32_t, FunctionSize> functions_;
     std::vector<std::uint32_t> order_;
-    std::uint64_t instructions_ = 0, largest_entry_ = 0;
+    std::uint64_t instructions_ = 0, largest_entry_ = 0, own_instructions_ = 0, own_blocks_ = 0;
 };
 
 }  // namespace
@@ -191,9 +197,9 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
         .RegisterPass(spvtools::CreateScalarReplacementPass(100))
         .RegisterPass(spvtools::CreateLocalAccessChainConvertPass())
         .RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass())
-        .RegisterPass(spvtools::CreateLocalSingleStoreElimPass())
-        .RegisterPass(spvtools::CreateSSARewritePass())
-        .RegisterPass(spvtools::CreateAggressiveDCEPass(true));
+        .RegisterPass(spvtools::CreateLocalSingleStoreElimPass());
+    if (plan.blocks() <= most_rewritten_blocks) optimizer.RegisterPass(spvtools::CreateSSARewritePass());
+    optimizer.RegisterPass(spvtools::CreateAggressiveDCEPass(true));
     spvtools::OptimizerOptions options;
     options.set_run_validator(false);
     std::vector<std::uint32_t> result;

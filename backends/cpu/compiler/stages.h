@@ -22,6 +22,9 @@ class ComputeEmitter final : public Emitter {
     std::vector<Component> input_components(const Variable& variable) override;
     llvm::Value* workgroup_memory() override { return memory; }
     void add_stage_values(std::vector<llvm::Value**>& places) override;
+    llvm::Value* large_memory(std::uint64_t bytes) override;
+    [[nodiscard]] bool is_on_heap() const override { return function_->isPresplitCoroutine(); }
+    [[nodiscard]] bool waits_for_workgroup(const Instruction& barrier) const;
     void emit_subgroup_body(llvm::Value* subgroup);
     void emit_plain_kernel();
     void emit_suspending_kernel();

@@ -223,7 +223,7 @@ void Uniformity::visit(const Instruction& at, Id block) {
         case Op::OpRayQueryGetWorldRayDirectionKHR: case Op::OpRayQueryGetWorldRayOriginKHR:
         case Op::OpRayQueryGetIntersectionObjectToWorldKHR: case Op::OpRayQueryGetIntersectionWorldToObjectKHR:
         case Op::OpGroupNonUniformShuffleDown: case Op::OpGroupNonUniformQuadBroadcast:
-        case Op::OpGroupNonUniformQuadSwap: case Op::OpIsHelperInvocationEXT:
+        case Op::OpGroupNonUniformQuadSwap: case Op::OpGroupNonUniformRotateKHR: case Op::OpIsHelperInvocationEXT:
             return mark(divergent_, at.result);
         // Equal in all lanes whatever goes in, if the whole subgroup takes part in the reduction.
         case Op::OpGroupNonUniformBroadcastFirst: case Op::OpGroupNonUniformBallot: case Op::OpGroupNonUniformAll:
