@@ -129,7 +129,7 @@ llvm::Value* Emitter::both(llvm::Value* lanes_on, llvm::Value* condition) {
 llvm::AllocaInst* Emitter::make_slot(llvm::Type* type, const char* slot_name) {
     llvm::IRBuilder<> at(slot_block, slot_block->begin());
     llvm::AllocaInst* slot = at.CreateAlloca(type, nullptr, slot_name);
-    slot->setAlignment(llvm::Align(type->isVectorTy() || type->isArrayTy() ? 64 : 8));
+    slot->setAlignment(llvm::Align(type->isVectorTy() || type->isAggregateType() ? 64 : 8));
     return slot;
 }
 

@@ -320,16 +320,6 @@ TEST_P(ForeignModule, PointersIntoWorkgroupMemoryDependOnALane) {
            [](std::uint32_t id) { return 63 - id + (id % 2 ? 1000 : 0); });
 }
 
-TEST_P(ForeignModule, ArraysOfArraysOfBuffers) {
-    const std::string text = R"(
-        layout(local_size_x = 64) in;
-        layout(set = 0, binding = 0) buffer Result { uint result[]; } buffers[1][1];
-        layout(set = 0, binding = 1) readonly buffer Numbers { uint n[]; } sources[1][1];
-        void main() { uint id = gl_LocalInvocationIndex; buffers[0][0].result[id] = sources[0][0].n[id] * 3u; }
-    )";
-    expect(ComputeRunner{GetParam()}.run_glsl(text), [](std::uint32_t id) { return id * 3; });
-}
-
 // ---- Atomics, dot products, switches, structures
 
 TEST_P(ForeignModule, AtomicSumsOfFloatsAndDoubles) {
