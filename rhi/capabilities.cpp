@@ -17,6 +17,7 @@ namespace {
         X(anisotropic_filtering) X(border_color) X(depth_clamp) X(depth_bias_clamp) X(wireframe) X(cube_arrays)      \
             X(multi_draw_indirect) X(indirect_first_instance) X(timestamps) X(precise_occlusion)                     \
                 X(subgroup_operations) X(shader_float64) X(shader_int64) X(shader_int16) X(shader_int8)              \
+                    X(variable_pointers) X(float_atomics) X(integer_dot_product) X(subgroup_rotate)                  \
                     X(sample_rate_shading) X(block_compression) X(float_color_targets) X(ray_query) X(base_instance) \
                         X(texture_views) X(texture_view_formats) X(fill_storage_without_format) X(sampler_mip_bias)
 #define NACRE_LIMITS(X)                                                                                                \

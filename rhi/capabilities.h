@@ -35,6 +35,10 @@ struct Capabilities {
     bool shader_int64 = false;
     bool shader_int16 = false;
     bool shader_int8 = false;
+    bool variable_pointers = false;     ///< SPIR-V VariablePointers and VariablePointersStorageBuffer.
+    bool float_atomics = false;         ///< Sums, minima and maxima of 32 and 64 bits in buffers and workgroup memory.
+    bool integer_dot_product = false;   ///< SPIR-V DotProduct.
+    bool subgroup_rotate = false;       ///< SPIR-V GroupNonUniformRotateKHR.
     bool sample_rate_shading = false;
     bool block_compression = false;     ///< BC1 to BC7.
     bool float_color_targets = false;   ///< 16-bit float formats as color targets, with blending.

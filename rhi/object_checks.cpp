@@ -513,6 +513,14 @@ Check check_shader(const ShaderReflection& reflection, const std::string& name, 
         if (used == "Int64" && !capabilities.shader_int64) return lacks("64-bit integers", "shader_int64");
         if (used == "Int16" && !capabilities.shader_int16) return lacks("16-bit integers", "shader_int16");
         if (used == "Int8" && !capabilities.shader_int8) return lacks("8-bit integers", "shader_int8");
+        if (used.starts_with("VariablePointers") && !capabilities.variable_pointers)
+            return lacks("variable pointers (" + used + ")", "variable_pointers");
+        if (used.starts_with("AtomicFloat") && !capabilities.float_atomics)
+            return lacks("atomic operations on floats (" + used + ")", "float_atomics");
+        if (used.starts_with("DotProduct") && !capabilities.integer_dot_product)
+            return lacks("dot products of integers (" + used + ")", "integer_dot_product");
+        if (used == "GroupNonUniformRotateKHR" && !capabilities.subgroup_rotate)
+            return lacks("rotation in subgroups (" + used + ")", "subgroup_rotate");
         if (used == "SampleRateShading" && !capabilities.sample_rate_shading)
             return lacks("per-sample shading", "sample_rate_shading");
         if ((used == "ImageCubeArray" || used == "SampledCubeArray") && !capabilities.cube_arrays)

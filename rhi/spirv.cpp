@@ -45,7 +45,10 @@ constexpr auto capability_table = std::to_array<CapabilityInfo>({
     KNOWN(RuntimeDescriptorArray), KNOWN(UniformBufferArrayNonUniformIndexing),
     KNOWN(SampledImageArrayNonUniformIndexing), KNOWN(StorageBufferArrayNonUniformIndexing),
     KNOWN(StorageImageArrayNonUniformIndexing), KNOWN(VulkanMemoryModel), KNOWN(VulkanMemoryModelDeviceScope),
-    KNOWN(DemoteToHelperInvocation),
+    KNOWN(DemoteToHelperInvocation), KNOWN(VariablePointersStorageBuffer), KNOWN(VariablePointers),
+    KNOWN(AtomicFloat32AddEXT), KNOWN(AtomicFloat64AddEXT), KNOWN(AtomicFloat32MinMaxEXT), KNOWN(AtomicFloat64MinMaxEXT),
+    KNOWN(DotProduct), KNOWN(DotProductInputAll), KNOWN(DotProductInput4x8Bit), KNOWN(DotProductInput4x8BitPacked),
+    KNOWN(GroupNonUniformRotateKHR), KNOWN(DeviceGroup),
     FOREIGN(Geometry), FOREIGN(Tessellation), FOREIGN(Addresses), FOREIGN(Linkage), FOREIGN(Kernel), FOREIGN(Vector16),
     FOREIGN(Float16Buffer), FOREIGN(ImageBasic), FOREIGN(ImageReadWrite), FOREIGN(ImageMipmap), FOREIGN(Pipes),
     FOREIGN(Groups), FOREIGN(DeviceEnqueue), FOREIGN(LiteralSampler), FOREIGN(AtomicStorage),
@@ -54,14 +57,13 @@ constexpr auto capability_table = std::to_array<CapabilityInfo>({
     FOREIGN(ImageBuffer), FOREIGN(TransformFeedback), FOREIGN(GeometryStreams), FOREIGN(MultiViewport),
     FOREIGN(SubgroupDispatch), FOREIGN(NamedBarrier), FOREIGN(PipeStorage), FOREIGN(ShaderLayer),
     FOREIGN(ShaderViewportIndex), FOREIGN(UniformDecoration), FOREIGN(FragmentShadingRateKHR),
-    FOREIGN(WorkgroupMemoryExplicitLayoutKHR), FOREIGN(DeviceGroup), FOREIGN(MultiView),
-    FOREIGN(VariablePointersStorageBuffer), FOREIGN(VariablePointers), FOREIGN(SampleMaskPostDepthCoverage),
+    FOREIGN(WorkgroupMemoryExplicitLayoutKHR), FOREIGN(MultiView), FOREIGN(SampleMaskPostDepthCoverage),
     FOREIGN(RayQueryProvisionalKHR), FOREIGN(RayTracingKHR), FOREIGN(StencilExportEXT), FOREIGN(Int64ImageEXT),
     FOREIGN(ShaderClockKHR), FOREIGN(ShaderViewportIndexLayerEXT), FOREIGN(FragmentFullyCoveredEXT),
     FOREIGN(MeshShadingNV), FOREIGN(MeshShadingEXT), FOREIGN(FragmentBarycentricKHR), FOREIGN(FragmentDensityEXT),
     FOREIGN(RayTracingNV), FOREIGN(PhysicalStorageBufferAddresses), FOREIGN(CooperativeMatrixNV),
     FOREIGN(FragmentShaderSampleInterlockEXT), FOREIGN(FragmentShaderPixelInterlockEXT), FOREIGN(BindlessTextureNV),
-    FOREIGN(AtomicFloat32MinMaxEXT), FOREIGN(AtomicFloat32AddEXT), FOREIGN(DotProduct),
+    FOREIGN(AtomicFloat16AddEXT), FOREIGN(AtomicFloat16MinMaxEXT),
 #undef KNOWN
 #undef FOREIGN
 });

@@ -52,6 +52,7 @@ rhi::Capabilities find_capabilities(std::uint32_t subgroup_size) {
     result.timestamps = result.precise_occlusion = true;
     result.subgroup_operations = true;
     result.shader_float64 = result.shader_int64 = result.shader_int16 = result.shader_int8 = true;
+    result.variable_pointers = result.float_atomics = result.integer_dot_product = result.subgroup_rotate = true;
     result.sample_rate_shading = true;
     result.block_compression = true;
     result.float_color_targets = true;

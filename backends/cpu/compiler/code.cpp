@@ -85,7 +85,7 @@ class OrcGenerator final : public CodeGenerator {
         features_ = features;
         contract_ = contract;
         triple_ = llvm::sys::getProcessTriple();
-        auto machine = make_machine();
+        auto machine = make_machine(llvm::CodeGenOptLevel::Less);
         if (!machine) return std::unexpected(failed("CPU backend", "LLVM knows no target for " + triple_));
         layout_ = machine->createDataLayout();
         fingerprint_ = fmt::format("llvm {} {} {} {} {}", LLVM_VERSION_STRING, triple_, cpu_, features_, contract);
@@ -104,7 +104,9 @@ class OrcGenerator final : public CodeGenerator {
     }
 
     Expected<std::vector<std::byte>> compile(llvm::Module& module, const std::string& name, bool has_coroutines) override {
-        auto machine = make_machine();
+        // Translation with less care takes time in proportion; the usual one does not, where blocks are long.
+        const bool is_huge = module.getInstructionCount() > most_instructions;
+        auto machine = make_machine(is_huge ? llvm::CodeGenOptLevel::None : llvm::CodeGenOptLevel::Less);
         if (!machine) return std::unexpected(failed(name, "no target machine"));
         for (llvm::Function& function : module) {
             if (function.isDeclaration()) continue;
@@ -144,14 +146,17 @@ class OrcGenerator final : public CodeGenerator {
     bool has_half_instructions() const override { return has_half_; }
 
   private:
-    std::unique_ptr<llvm::TargetMachine> make_machine() const {
+    /// Instructions of a module up to which its code is worth the time that good code takes.
+    static constexpr unsigned most_instructions = 150'000;
+
+    std::unique_ptr<llvm::TargetMachine> make_machine(llvm::CodeGenOptLevel level) const {
         std::string error;
         const llvm::Target* target = llvm::TargetRegistry::lookupTarget(triple_, error);
         if (!target) return nullptr;
         llvm::TargetOptions options;
         options.AllowFPOpFusion = contract_ ? llvm::FPOpFusion::Standard : llvm::FPOpFusion::Strict;
         return std::unique_ptr<llvm::TargetMachine>(target->createTargetMachine(triple_, cpu_, features_, options, llvm::Reloc::PIC_, llvm::CodeModel::Small,
-                                                                                llvm::CodeGenOptLevel::Less, true));
+                                                                                level, true));
     }
 
     /// The lean list of passes of the design: twice as fast to compile as O2, and code that runs as fast.

@@ -21,8 +21,13 @@ namespace {
 
 class ShaderCompilation final : public Compiler {
   public:
-    ShaderCompilation(const CompilerOptions& options, std::unique_ptr<CodeGenerator> generator)
-        : options_(options), generator_(std::move(generator)) {}
+    /// How code is made.
+    struct Variant {
+        CompilerOptions options;
+        std::unique_ptr<CodeGenerator> generator;
+    };
+    /// @param subgroups  for compute shaders that see how many lanes there are
+    ShaderCompilation(Variant all, Variant subgroups) : all_(std::move(all)), subgroups_(std::move(subgroups)) {}
 
     Expected<ComputeProgram> compile_compute(const ShaderSource& source) override {
         ComputeProgram program;
@@ -30,8 +35,9 @@ class ShaderCompilation final : public Compiler {
         std::uint64_t workgroup_bytes = 0;
         std::uint32_t subgroups = 1;
         bool has_barriers = false;
-        NACRE_TRY(program.code, compile(source, spv::ExecutionModel::GLCompute, {}, [&](llvm::Module& target, const Module& module) {
-                      ComputeEmitter emitter(target, module, options_, source.slots);
+        const Variant& how = source.reflection && source.reflection->uses_subgroups && subgroups_.generator ? subgroups_ : all_;
+        NACRE_TRY(program.code, compile(how, source, spv::ExecutionModel::GLCompute, {}, [&](llvm::Module& target, const Module& module) {
+                      ComputeEmitter emitter(target, module, how.options, source.slots);
                       emitter.emit();
                       program.workgroup_size = module.workgroup_size;
                       workgroup_bytes = emitter.workgroup_bytes, subgroups = emitter.subgroups, has_barriers = emitter.has_barriers;
@@ -54,8 +60,8 @@ class ShaderCompilation final : public Compiler {
     Expected<VertexProgram> compile_vertex(const ShaderSource& source, const VertexInput& input) override {
         VertexProgram program;
         std::shared_ptr<CompiledCode> code;
-        NACRE_TRY(code, compile(source, spv::ExecutionModel::Vertex, input, [&](llvm::Module& target, const Module& module) {
-                      VertexEmitter emitter(target, module, options_, source.slots, input);
+        NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Vertex, input, [&](llvm::Module& target, const Module& module) {
+                      VertexEmitter emitter(target, module, all_.options, source.slots, input);
                       emitter.emit();
                       program = emitter.program;
                       return false;
@@ -70,8 +76,8 @@ class ShaderCompilation final : public Compiler {
     Expected<FragmentProgram> compile_fragment(const ShaderSource& source) override {
         FragmentProgram program;
         std::shared_ptr<CompiledCode> code;
-        NACRE_TRY(code, compile(source, spv::ExecutionModel::Fragment, {}, [&](llvm::Module& target, const Module& module) {
-                      FragmentEmitter emitter(target, module, options_, source.slots);
+        NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Fragment, {}, [&](llvm::Module& target, const Module& module) {
+                      FragmentEmitter emitter(target, module, all_.options, source.slots);
                       emitter.emit();
                       program = emitter.program;
                       return false;
@@ -91,12 +97,13 @@ class ShaderCompilation final : public Compiler {
 
     /// Runs `emit` on a new LLVM module and makes code of it; `emit` tells whether it has coroutines.
     template <typename Emit>
-    Expected<std::shared_ptr<CompiledCode>> compile(const ShaderSource& source, spv::ExecutionModel model, const VertexInput& input, Emit&& emit) {
+    Expected<std::shared_ptr<CompiledCode>> compile(const Variant& how, const ShaderSource& source, spv::ExecutionModel model,
+                                                    const VertexInput& input, Emit&& emit) {
         NACRE_TRY(const std::vector<std::uint32_t> words, legalize(source.spirv, source.specialization, source.name));
         NACRE_TRY(const Module module, Module::parse(words, source.entry_point, model, source.name));
         llvm::LLVMContext context;
         auto target = std::make_unique<llvm::Module>("shader", context);
-        generator_->prepare(*target);
+        how.generator->prepare(*target);
         bool has_coroutines = false;
         try {
             has_coroutines = emit(*target, module);
@@ -117,21 +124,22 @@ class ShaderCompilation final : public Compiler {
             llvm::raw_fd_ostream out(fmt::format("{}/{}.ll", dump, file), problem);
             if (!problem) target->print(out, nullptr);
         }
-        const Hash128 key = key_of(words, source, model, input);
+        const Hash128 key = key_of(how, words, source, model, input);
         std::vector<std::byte> object;
-        if (options_.use_disk_cache)
+        if (how.options.use_disk_cache)
             if (auto found = cache_.load("cpu", key)) object = std::move(*found);
         if (object.empty()) {
-            NACRE_TRY(object, generator_->compile(*target, std::string(source.name), has_coroutines));
-            if (options_.use_disk_cache) cache_.store("cpu", key, object);
+            NACRE_TRY(object, how.generator->compile(*target, std::string(source.name), has_coroutines));
+            if (how.options.use_disk_cache) cache_.store("cpu", key, object);
         }
-        NACRE_TRY(std::shared_ptr<LoadedCode> code, generator_->load(std::move(object), std::string(source.name)));
+        NACRE_TRY(std::shared_ptr<LoadedCode> code, how.generator->load(std::move(object), std::string(source.name)));
         return std::shared_ptr<CompiledCode>(std::move(code));
     }
 
-    Hash128 key_of(std::span<const std::uint32_t> words, const ShaderSource& source, spv::ExecutionModel model, const VertexInput& input) const {
-        std::string text = fmt::format("{} {} {} {} {} {} {}\n", nacre_cpu_compiler_sources, options_.lanes, static_cast<int>(options_.mode),
-                                       static_cast<int>(model), source.entry_point, generator_->fingerprint(), words.size());
+    Hash128 key_of(const Variant& how, std::span<const std::uint32_t> words, const ShaderSource& source, spv::ExecutionModel model,
+                   const VertexInput& input) const {
+        std::string text = fmt::format("{} {} {} {} {} {} {}\n", nacre_cpu_compiler_sources, how.options.lanes, static_cast<int>(how.options.mode),
+                                       static_cast<int>(model), source.entry_point, how.generator->fingerprint(), words.size());
         for (const BindingSlots& slot : source.slots) text += fmt::format("s{} {} {} {}\n", slot.set, slot.binding, slot.first, slot.count);
         for (const rhi::VertexAttribute& at : input.attributes)
             text += fmt::format("a{} {} {} {}\n", at.location, at.buffer, at.offset, static_cast<int>(at.format));
@@ -140,8 +148,7 @@ class ShaderCompilation final : public Compiler {
         return hash128(std::as_bytes(std::span(text)));
     }
 
-    CompilerOptions options_;
-    std::unique_ptr<CodeGenerator> generator_;
+    Variant all_, subgroups_;
     DiskCache cache_;
 };
 
@@ -150,8 +157,15 @@ class ShaderCompilation final : public Compiler {
 Expected<std::unique_ptr<Compiler>> Compiler::create(const CompilerOptions& options) {
     if (options.lanes != 4 && options.lanes != 8 && options.lanes != 16)
         return fail(ErrorCode::invalid_argument, "make CPU compiler", fmt::format("lanes={}", options.lanes), "lanes are 4, 8 or 16", "Choose one of them.");
-    NACRE_TRY(std::unique_ptr<CodeGenerator> generator, CodeGenerator::create(options.lanes, options.mode == ExecutionMode::fast));
-    return std::make_unique<ShaderCompilation>(options, std::move(generator));
+    const bool is_fast = options.mode == ExecutionMode::fast;
+    ShaderCompilation::Variant all{options, nullptr}, subgroups{options, nullptr};
+    NACRE_TRY(all.generator, CodeGenerator::create(options.lanes, is_fast));
+    // Results must not depend on the lanes where arithmetic is consistent: subgroups are as large as they can be.
+    if (!is_fast && options.lanes < max_lanes) {
+        subgroups.options.lanes = max_lanes;
+        NACRE_TRY(subgroups.generator, CodeGenerator::create(max_lanes, is_fast));
+    }
+    return std::make_unique<ShaderCompilation>(std::move(all), std::move(subgroups));
 }
 
 std::uint32_t native_lanes() {

@@ -9,10 +9,15 @@ namespace nacre::cpu {
 using spv::BuiltIn;
 using spv::Op;
 
+/// Whether a barrier is one of the workgroup: the lanes of a subgroup run together anyway.
+bool ComputeEmitter::waits_for_workgroup(const Instruction& barrier) const {
+    return module.constant_word(barrier.operand(0)) != static_cast<std::uint32_t>(spv::Scope::Subgroup);
+}
+
 bool ComputeEmitter::emit_stage(const Instruction& at) {
     switch (at.op) {
         case Op::OpControlBarrier: {
-            if (!has_barriers) return true;
+            if (!has_barriers || !waits_for_workgroup(at)) return true;
             // All subgroups of the workgroup come to this point before the first of them goes on.
             llvm::Value* state = builder.CreateIntrinsic(llvm::Intrinsic::coro_suspend, {}, {llvm::ConstantTokenNone::get(context), builder.getFalse()});
             llvm::BasicBlock* resumed = llvm::BasicBlock::Create(context, "resumed", function_);
@@ -98,6 +103,22 @@ void ComputeEmitter::emit_subgroup_body(llvm::Value* subgroup) {
     llvm::Value* const entry_mask = mask;
     declare_variables();
     emit_function(module.entry(), {}, entry_mask);
+}
+
+llvm::Value* ComputeEmitter::large_memory(std::uint64_t bytes) {
+    if (is_on_heap()) return nullptr;
+    // Behind the workgroup's variables, and right behind where their address comes from, so that all code sees it.
+    auto* made = llvm::dyn_cast<llvm::Instruction>(memory);
+    if (!made || !made->getNextNode()) return nullptr;
+    const std::uint64_t offset = (workgroup_variable_bytes + 63) / 64 * 64;
+    workgroup_variable_bytes = offset + bytes;
+    llvm::IRBuilder<> at(made->getNextNode());
+    return at.CreateGEP(at.getInt8Ty(), memory, at.getInt64(offset));
+}
+
+void ComputeEmitter::add_stage_values(std::vector<llvm::Value**>& places) {
+    places.insert(places.end(), {&range, &memory, &group_x, &subgroup_index});
+    for (Component& axis : local_id) places.insert(places.end(), {&axis.value, &axis.linear_base});
 }
 
 void ComputeEmitter::emit_plain_kernel() {
@@ -271,7 +292,7 @@ void ComputeEmitter::emit() {
     subgroups = static_cast<std::uint32_t>((total + lanes - 1) / lanes);
     for (const auto& [id, function] : module.functions())
         for (const Block& block : function.blocks)
-            for (const Instruction& at : block.body) has_barriers = has_barriers || at.op == Op::OpControlBarrier;
+            for (const Instruction& at : block.body) has_barriers = has_barriers || (at.op == Op::OpControlBarrier && waits_for_workgroup(at));
     has_barriers = has_barriers && subgroups > 1;
     if (has_barriers) emit_suspending_kernel();
     else emit_plain_kernel();

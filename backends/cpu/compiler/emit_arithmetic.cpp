@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <llvm/IR/Constants.h>
+#include <llvm/IR/Intrinsics.h>
 
 #include "backends/cpu/compiler/emitter.h"
 
@@ -217,15 +218,15 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
             return {all};
         }
         case Op::OpSelect: {
-            if (module.type(type_id).kind == TypeKind::pointer) reject("pointers that depend on a condition are not supported");
-            const Value condition = get(operands[0]), yes = get(operands[1]), no = get(operands[2]);
+            const Value condition = get(operands[0]);
+            const std::vector<Component> yes = get_components(operands[1]), no = get_components(operands[2]);
             std::vector<Component> made;
-            for (std::size_t i = 0; i < yes.components.size(); ++i) {
+            for (std::size_t i = 0; i < yes.size(); ++i) {
                 const Component& which = condition.components.size() == 1 ? condition.components[0] : condition.components.at(i);
-                if (which.is_uniform() && !(yes.components[i].is_uniform() && no.components.at(i).is_uniform()))
-                    made.emplace_back(select(which.value, widen(yes.components[i]), widen(no.components.at(i))));
+                if (which.is_uniform() && !(yes[i].is_uniform() && no.at(i).is_uniform()))
+                    made.emplace_back(select(which.value, widen(yes[i]), widen(no.at(i))));
                 else
-                    made.push_back(apply({which, yes.components[i], no.components.at(i)},
+                    made.push_back(apply({which, yes[i], no.at(i)},
                                          [&](Values v) { return select(v[0], v[1], v[2]); }));
             }
             return made;
@@ -255,6 +256,40 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
             const Value x = get(operands[0]), y = get(operands[1]);
             Component sum = product(x.components.at(0), y.components.at(0));
             for (std::size_t i = 1; i < x.components.size(); ++i) sum = multiply_add(x.components[i], y.components.at(i), sum);
+            return {sum};
+        }
+        case Op::OpSDot: case Op::OpUDot: case Op::OpSUDot: case Op::OpSDotAccSat: case Op::OpUDotAccSat: case Op::OpSUDotAccSat: {
+            const bool is_unsigned = op == Op::OpUDot || op == Op::OpUDotAccSat;
+            const bool is_mixed = op == Op::OpSUDot || op == Op::OpSUDotAccSat;
+            const bool accumulates = op == Op::OpSDotAccSat || op == Op::OpUDotAccSat || op == Op::OpSUDotAccSat;
+            llvm::Type* kind = scalar_type(scalar_of(type_id));
+            const auto elements = [&](Id id, bool zero_extends) {
+                const Type& type = module.type(module.type_of(id));
+                std::vector<Component> parts = get(id).components;
+                if (type.kind != TypeKind::vector) {  // Four packed bytes.
+                    const Component word = parts.at(0);
+                    parts.clear();
+                    for (unsigned shift = 0; shift < 32; shift += 8)
+                        parts.push_back(apply({word}, [&](Values v) {
+                            return builder.CreateTrunc(builder.CreateLShr(v[0], shift), like(v[0], builder.getInt8Ty()));
+                        }));
+                }
+                for (Component& part : parts)
+                    part = apply({part}, [&](Values v) {
+                        return zero_extends ? builder.CreateZExtOrTrunc(v[0], like(v[0], kind)) : builder.CreateSExtOrTrunc(v[0], like(v[0], kind));
+                    });
+                return parts;
+            };
+            const std::vector<Component> x = elements(operands[0], is_unsigned), y = elements(operands[1], is_unsigned || is_mixed);
+            Component sum;
+            for (std::size_t i = 0; i < x.size(); ++i) {
+                const Component term = apply({x[i], y.at(i)}, [&](Values v) { return builder.CreateMul(v[0], v[1]); });
+                sum = sum ? apply({sum, term}, [&](Values v) { return builder.CreateAdd(v[0], v[1]); }) : term;
+            }
+            if (accumulates)
+                sum = apply({sum, get_scalar(operands[2])}, [&](Values v) {
+                    return builder.CreateBinaryIntrinsic(is_unsigned ? llvm::Intrinsic::uadd_sat : llvm::Intrinsic::sadd_sat, v[0], v[1]);
+                });
             return {sum};
         }
         case Op::OpMatrixTimesVector: {

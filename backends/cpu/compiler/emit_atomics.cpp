@@ -74,7 +74,7 @@ bool Emitter::emit_atomic(const Instruction& at) {
         case Op::OpAtomicFMaxEXT: operation = Operation::FMax, image_operation = AtomicOperation::maximum_float; break;
         default: return false;
     }
-    const Pointer pointer = *get(at.operand(0)).pointer;
+    const Pointer pointer = get_pointer(at.operand(0));
     const Id value_type = is_store ? module.type_of(at.operand(3)) : at.type;
     const Type& scalar = module.type(value_type);
     llvm::Type* kind = scalar_type(scalar);

@@ -35,8 +35,8 @@ bool Emitter::emit_composite(const Instruction& at) {
         case Op::OpCompositeConstruct: {
             std::vector<Component> components;
             for (const Id part : at.operands) {
-                const Value value = get(part);
-                components.insert(components.end(), value.components.begin(), value.components.end());
+                const std::vector<Component> value = get_components(part);
+                components.insert(components.end(), value.begin(), value.end());
             }
             set(at, std::move(components));
             return true;
@@ -49,10 +49,10 @@ bool Emitter::emit_composite(const Instruction& at) {
             return true;
         }
         case Op::OpCompositeInsert: {
-            const Value object = get(at.operand(0));
+            const std::vector<Component> object = get_components(at.operand(0));
             std::vector<Component> components = get(at.operand(1)).components;
             const Part part = part_at(module.type_of(at.operand(1)), at.operands.subspan(2));
-            for (std::size_t i = 0; i < object.components.size(); ++i) components.at(part.first + i) = object.components[i];
+            for (std::size_t i = 0; i < object.size(); ++i) components.at(part.first + i) = object[i];
             set(at, std::move(components));
             return true;
         }

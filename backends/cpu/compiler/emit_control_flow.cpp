@@ -18,71 +18,137 @@ constexpr std::uint32_t most_calls = 256;
 
 }  // namespace
 
-void Emitter::analyze_frame(Frame& made) {
-    const Function& function = *made.function;
+const Emitter::Shape& Emitter::shape_of(const Function& function) {
+    auto& known = shapes_[function.id];
+    if (known) return *known;
+    known = std::make_unique<Shape>();
+    Shape& shape = *known;
     const auto count = static_cast<std::uint32_t>(function.blocks.size());
-    made.blocks.resize(count);
-    for (std::uint32_t header = 0; header < count; ++header)
-        if (function.blocks[header].continue_target && uniformity.has_divergent_exit(function.blocks[header].id))
-            for (std::uint32_t i = header; i < end_of_construct(function, header); ++i) made.blocks[i].divergent_loop = header;
-    std::unordered_map<Id, std::uint32_t> home;
+    shape.blocks.resize(count);
+    std::vector<std::uint32_t> outer_loop(count, ~0u);  // Of headers: the loop around theirs.
+    for (std::uint32_t header = 0; header < count; ++header) {
+        if (!function.blocks[header].continue_target) continue;
+        const std::uint32_t end = end_of_construct(function, header);
+        Shape::BlockShape& loop = shape.blocks[header];
+        loop.end = end;
+        for (std::uint32_t i = header; i < end; ++i)
+            loop.returns_values |= function.blocks[i].terminator.op == Op::OpReturnValue;
+        if (!uniformity.has_divergent_exit(function.blocks[header].id)) continue;
+        outer_loop[header] = loop.divergent_loop;
+        for (std::uint32_t i = header; i < end; ++i) {
+            shape.blocks[i].divergent_loop = header;
+            for (const Id successor : function.blocks[i].successors)
+                if (const auto to = function.find_block(successor); to && (*to < header || *to >= end)) loop.targets.push_back(*to);
+        }
+        std::ranges::sort(loop.targets);
+        loop.targets.erase(std::ranges::unique(loop.targets).begin(), loop.targets.end());
+    }
+    find_uses(function, shape);
+    for (const auto& [id, use] : shape.uses) {
+        if (!use.is_leaving) continue;
+        for (std::uint32_t loop = shape.blocks[use.home].divergent_loop; loop != ~0u; loop = outer_loop[loop])
+            if (use.last >= shape.blocks[loop].end) shape.blocks[loop].leaving.push_back(id);
+    }
+    // So that the code made does not depend on the order of a hash table.
+    for (Shape::BlockShape& block : shape.blocks) std::ranges::sort(block.leaving);
+
+    for (std::uint32_t header = 0; header < count; ++header) {
+        const Block& block = function.blocks[header];
+        // Lanes meet again at the merge block if every way through the construct leads there.
+        const auto merge_block = function.find_block(block.merge);
+        if (!merge_block || *merge_block <= header) continue;
+        bool meets = true;
+        for (std::uint32_t i = header; i < *merge_block && meets; ++i) {
+            // Unreachable blocks of the construct have no predecessors.
+            if (i != header && function.blocks[i].predecessors.empty()) continue;
+            if (function.blocks[i].successors.empty()) meets = false;
+            for (const Id successor : function.blocks[i].successors) {
+                const auto to = function.find_block(successor);
+                if (!to || *to > *merge_block || *to < header || (*to == header && !block.continue_target)) meets = false;
+            }
+        }
+        for (const std::uint32_t from : function.blocks[*merge_block].predecessors)
+            if (from < header || from >= *merge_block) meets = false;
+        if (!meets) continue;
+        shape.blocks[header].reconverges = true;
+        shape.blocks[*merge_block].is_reconverged = true;
+    }
+    return shape;
+}
+
+void Emitter::find_uses(const Function& function, Shape& shape) const {
+    const auto count = static_cast<std::uint32_t>(function.blocks.size());
+    const auto is_remade = [&](const Instruction& at) {
+        if (!at.type || !module.has_type(at.type)) return false;
+        const Type& type = module.type(at.type);
+        // Pointers that depend on control flow are values.
+        const bool is_value = at.op == Op::OpSelect || at.op == Op::OpLoad || at.op == Op::OpFunctionCall || at.op == Op::OpCompositeExtract;
+        return type.is_opaque() || (type.kind == TypeKind::pointer && !is_value);
+    };
     for (std::uint32_t i = 0; i < count; ++i) {
-        for (const Instruction& at : function.blocks[i].phis) home[at.result] = i;
+        for (const Instruction& at : function.blocks[i].phis) shape.uses[at.result] = {i, i, false, false};
         for (const Instruction& at : function.blocks[i].body)
-            if (at.result) home[at.result] = i;
+            if (at.result) shape.uses[at.result] = {i, i, false, is_remade(at)};
     }
     const auto use = [&](Id id, std::uint32_t block) {
-        const auto found = home.find(id);
-        if (found == home.end() || found->second == block) return;
-        made.crossing.insert(id);
-        const std::uint32_t loop = made.blocks[found->second].divergent_loop;
-        if (loop != ~0u && (block < loop || block >= end_of_construct(function, loop))) made.leaving.insert(id);
+        const auto found = shape.uses.find(id);
+        if (found == shape.uses.end() || found->second.home == block) return;
+        found->second.last = std::max(found->second.last, block);
+        const std::uint32_t loop = shape.blocks[found->second.home].divergent_loop;
+        if (loop != ~0u && (block < loop || block >= shape.blocks[loop].end)) found->second.is_leaving = true;
     };
     for (std::uint32_t i = 0; i < count; ++i) {
         const Block& block = function.blocks[i];
         for (const Instruction& at : block.phis)
             for (std::size_t k = 0; k + 1 < at.operands.size(); k += 2)
                 if (const auto from = function.find_block(at.operands[k + 1])) use(at.operands[k], *from);
-        // Literals that look like ids do no harm: a slot too many, which LLVM removes.
+        // Literals that look like ids do no harm: a value that lasts longer than it need.
         for (const Instruction& at : block.body)
             for (const std::uint32_t operand : at.operands) use(operand, i);
         for (const std::uint32_t operand : block.terminator.operands) use(operand, i);
     }
-    // Pointers and images are made again where they are used, from operands that must last until there.
+    // Behind the loops that lanes leave one by one, pointers and images are made again from their operands.
     for (std::uint32_t i = count; i-- > 0;)
         for (auto at = function.blocks[i].body.rbegin(); at != function.blocks[i].body.rend(); ++at) {
-            if (!at->result || !at->type || !made.crossing.contains(at->result)) continue;
-            const Type& type = module.type(at->type);
-            if (type.kind != TypeKind::pointer && !type.is_opaque()) continue;
+            if (!at->result || !at->type) continue;
+            const Shape::Use& made = shape.uses.at(at->result);
+            if (!made.is_leaving || !made.is_remade) continue;
+            const std::uint32_t last = made.last;
             for (const std::uint32_t operand : at->operands) {
-                const auto found = home.find(operand);
-                if (found == home.end()) continue;
-                made.crossing.insert(operand);
-                if (made.blocks[found->second].divergent_loop != ~0u) made.leaving.insert(operand);
+                const auto found = shape.uses.find(operand);
+                if (found == shape.uses.end()) continue;
+                found->second.last = std::max(found->second.last, last);
+                if (shape.blocks[found->second.home].divergent_loop != ~0u) found->second.is_leaving = true;
             }
         }
+}
 
-    for (std::uint32_t header = 0; header < count; ++header) {
-        const Block& block = function.blocks[header];
-        // Lanes meet again at the merge block if every way through the construct leads there.
-        const auto merge = function.find_block(block.merge);
-        if (!merge || *merge <= header) continue;
-        bool meets = true;
-        for (std::uint32_t i = header; i < *merge && meets; ++i) {
-            // Unreachable blocks of the construct have no predecessors.
-            if (i != header && function.blocks[i].predecessors.empty()) continue;
-            if (function.blocks[i].successors.empty()) meets = false;
-            for (const Id successor : function.blocks[i].successors) {
-                const auto to = function.find_block(successor);
-                if (!to || *to > *merge || *to < header || (*to == header && !block.continue_target)) meets = false;
-            }
+void Emitter::assign(llvm::Value*& place, llvm::Value* value, llvm::Value* otherwise, std::uint32_t last_use) {
+    frame->changes.push_back({&place, place, otherwise, last_use});
+    place = value;
+}
+
+void Emitter::merge(std::size_t first_change, llvm::BasicBlock* skipped, llvm::BasicBlock* ran, std::uint32_t next) {
+    auto& changes = frame->changes;
+    std::unordered_set<llvm::Value**> seen;
+    std::size_t kept = first_change;
+    for (std::size_t i = first_change; i < changes.size(); ++i) {
+        const Frame::Change change = changes[i];
+        if (change.last_use < next || !*change.place || !seen.insert(change.place).second) continue;
+        llvm::Value* const now = *change.place;
+        llvm::Value* before = change.before ? change.before : change.otherwise;
+        // Constants are the same wherever they are needed.
+        if (!before && llvm::isa<llvm::Constant>(now)) before = now;
+        if (!before) before = llvm::UndefValue::get(now->getType());
+        if (before != now) {
+            llvm::PHINode* either = builder.CreatePHI(now->getType(), 2);
+            either->addIncoming(now, ran);
+            either->addIncoming(before, skipped);
+            *change.place = either;
         }
-        for (const std::uint32_t from : function.blocks[*merge].predecessors)
-            if (from < header || from >= *merge) meets = false;
-        if (!meets) continue;
-        made.blocks[header].reconverges = true;
-        made.blocks[*merge].is_reconverged = true;
+        changes[kept++] = change;
     }
+    changes.resize(kept);
 }
 
 std::vector<Component> Emitter::emit_function(const Function& callee, const std::vector<Value>& arguments,
@@ -90,56 +156,42 @@ std::vector<Component> Emitter::emit_function(const Function& callee, const std:
     if (++call_depth > most_calls) reject("functions call each other more than 256 deep");
     Frame made;
     made.function = &callee;
+    made.shape = &shape_of(callee);
     made.entry_mask = entry_mask;
-    analyze_frame(made);
     Frame* const outer = frame;
     llvm::Value* const outer_mask = mask;
     const Instruction* const outer_instruction = current;
+    const bool was_unguarded = runs_without_lanes;
     frame = &made;
-    made.chains.push_back(++chain_count);
+    runs_without_lanes = false;
     for (std::size_t i = 0; i < callee.parameters.size(); ++i) made.values[callee.parameters[i].result] = arguments[i];
+    made.blocks.resize(callee.blocks.size());
     for (std::uint32_t i = 0; i < callee.blocks.size(); ++i) {
         Frame::BlockState& state = made.blocks[i];
-        state.reached = make_slot(builder.getInt1Ty(), "reached");
-        state.mask = make_slot(mask_type, "mask");
-        builder.CreateStore(builder.getFalse(), state.reached);
-        builder.CreateStore(llvm::Constant::getNullValue(mask_type), state.mask);
-        if (callee.blocks[i].continue_target) {
-            state.back_reached = make_slot(builder.getInt1Ty(), "back_reached");
-            state.back_mask = make_slot(mask_type, "back_mask");
-        }
         for (const Instruction& phi : callee.blocks[i].phis) {
-            const bool is_uniform = !uniformity.is_divergent(phi.result);
-            std::vector<llvm::AllocaInst*> phi_slots;
             const Type& type = module.type(phi.type);
-            if (type.kind == TypeKind::pointer || type.is_opaque()) {
+            if (type.components == 0) {
                 current = &phi;
-                reject("pointers that depend on control flow (variable pointers) are not supported");
+                reject("images and pointers to what is no buffer cannot depend on control flow");
             }
-            for_each_component_type(phi.type, [&](const Type& scalar) {
-                llvm::Type* kind = scalar_type(scalar);
-                phi_slots.push_back(make_slot(is_uniform ? kind : vector_of(kind), "phi"));
-            });
-            state.phi_slots.push_back(std::move(phi_slots));
-            state.phi_uniform.push_back(is_uniform);
+            state.phi_uniform.push_back(!uniformity.is_divergent(phi.result));
+            state.arrival.phis.emplace_back(type.components, nullptr);
+            if (callee.blocks[i].continue_target) state.back.phis.emplace_back(type.components, nullptr);
         }
     }
-    const Type& result = module.type(callee.return_type);
-    if (result.components > 0)
-        for_each_component_type(callee.return_type, [&](const Type& scalar) {
-            made.return_slots.push_back(make_slot(vector_of(scalar_type(scalar)), "return"));
-        });
-    if (!callee.blocks.empty()) {
-        builder.CreateStore(builder.getTrue(), made.blocks[0].reached);
-        builder.CreateStore(entry_mask, made.blocks[0].mask);
-        emit_range(0, static_cast<std::uint32_t>(callee.blocks.size()));
-    }
+    made.returned.resize(module.type(callee.return_type).components);
+    emit_range(0, static_cast<std::uint32_t>(callee.blocks.size()));
     std::vector<Component> values;
-    for (llvm::AllocaInst* slot : made.return_slots)
-        values.emplace_back(builder.CreateLoad(slot->getAllocatedType(), slot));
+    for (std::uint32_t i = 0; i < made.returned.size(); ++i) {
+        llvm::Value* value = made.returned[i];
+        // Of a function that never returns.
+        if (!value) value = widen(zero(module.type(component_type(callee.return_type, i))));
+        values.emplace_back(value);
+    }
     frame = outer;
     mask = outer_mask;
     current = outer_instruction;
+    runs_without_lanes = was_unguarded;
     --call_depth;
     return values;
 }
@@ -181,41 +233,44 @@ bool Emitter::is_cheap(std::uint32_t index) const {
 
 std::uint32_t Emitter::emit_chain(std::uint32_t first, std::uint32_t end) {
     const Function& function = *frame->function;
-    Frame::BlockState& start = frame->blocks[first];
-    llvm::BasicBlock* after = nullptr;
-    const bool is_guarded = first != 0 && !is_cheap(first);
+    const Arrival& arrival = frame->blocks[first].arrival;
+    if (first != 0 && !arrival.reached) return first + 1;  // Nothing leads there.
+    llvm::BasicBlock *before = builder.GetInsertBlock(), *after = nullptr;
+    const std::size_t first_change = frame->changes.size();
+    const bool is_certain = first == 0 || is_all(arrival.reached);
+    const bool is_guarded = !is_certain && !is_cheap(first);
     const bool was_unguarded = runs_without_lanes;
-    runs_without_lanes = first != 0 && !is_guarded;
+    runs_without_lanes = !is_certain && !is_guarded;
     if (is_guarded) {
         llvm::BasicBlock* body = llvm::BasicBlock::Create(context, "block", function_);
         after = llvm::BasicBlock::Create(context, "next", function_);
-        builder.CreateCondBr(builder.CreateLoad(builder.getInt1Ty(), start.reached), body, after);
+        builder.CreateCondBr(arrival.reached, body, after);
         builder.SetInsertPoint(body);
     }
     // The entry's mask is taken as it is, so that what is known of it (all lanes) is known everywhere.
-    llvm::Value* chain_mask = first == 0 ? frame->entry_mask : builder.CreateLoad(mask_type, start.mask);
-    frame->chains.push_back(++chain_count);
+    llvm::Value* chain_mask = first == 0 ? frame->entry_mask : arrival.mask;
     std::uint32_t at = first;
     for (;;) {
         const Block& block = function.blocks[at];
         std::uint32_t next = at + 1;
         if (block.continue_target) {
-            const std::uint32_t loop_end = std::min(end_of_construct(function, at), end);
+            const std::uint32_t loop_end = std::min(frame->shape->blocks[at].end, end);
             emit_loop_body(at, loop_end, chain_mask);
             next = loop_end;
         } else {
             emit_block(at, chain_mask);
         }
-        if (frame->blocks[at].reconverges) {
-            const std::uint32_t merge = *function.find_block(block.merge);
-            emit_range(next, std::min(merge, end));
-            if (merge < end) {
-                at = merge;
+        if (frame->shape->blocks[at].reconverges) {
+            const std::uint32_t merge_block = *function.find_block(block.merge);
+            emit_range(next, std::min(merge_block, end));
+            if (merge_block < end) {
+                at = merge_block;
                 continue;
             }
             // Behind the range: found there by its mask, as any other block.
-            builder.CreateStore(builder.getTrue(), frame->blocks[merge].reached);
-            builder.CreateStore(chain_mask, frame->blocks[merge].mask);
+            Arrival& later = frame->blocks[merge_block].arrival;
+            assign(later.reached, builder.getTrue(), builder.getFalse(), merge_block);
+            assign(later.mask, chain_mask, llvm::Constant::getNullValue(mask_type), merge_block);
             next = end;
         } else if (!runs_without_lanes && !block.continue_target && block.terminator.op == Op::OpBranch && next < end &&
                    function.find_block(block.terminator.operand(0)) == next &&
@@ -226,42 +281,112 @@ std::uint32_t Emitter::emit_chain(std::uint32_t first, std::uint32_t end) {
         at = next;
         break;
     }
-    frame->chains.pop_back();
     runs_without_lanes = was_unguarded;
     if (is_guarded) {
+        llvm::BasicBlock* ran = builder.GetInsertBlock();
         builder.CreateBr(after);
         builder.SetInsertPoint(after);
+        merge(first_change, before, ran, at);
     }
     return at;
 }
 
 void Emitter::emit_loop_body(std::uint32_t header, std::uint32_t end, llvm::Value* entry_mask) {
+    const Function& function = *frame->function;
+    const Shape::BlockShape& shape = frame->shape->blocks[header];
     Frame::BlockState& state = frame->blocks[header];
+    const bool is_divergent = uniformity.has_divergent_exit(function.blocks[header].id);
+    llvm::BasicBlock* before = builder.GetInsertBlock();
     llvm::BasicBlock* head = llvm::BasicBlock::Create(context, "loop", function_);
     llvm::BasicBlock* after = llvm::BasicBlock::Create(context, "left_loop", function_);
-    builder.CreateStore(entry_mask, state.mask);
     builder.CreateBr(head);
     builder.SetInsertPoint(head);
-    llvm::Value* loop_mask = builder.CreateLoad(mask_type, state.mask);
-    llvm::Value* none = llvm::Constant::getNullValue(mask_type);
-    for (std::uint32_t i = header + 1; i < end; ++i) {
-        builder.CreateStore(builder.getFalse(), frame->blocks[i].reached);
-        builder.CreateStore(none, frame->blocks[i].mask);
+
+    // What goes from one iteration to the next; where from, is known at the end.
+    std::vector<std::pair<llvm::PHINode*, llvm::Value**>> carried;
+    const auto carry = [&](llvm::Value*& place, llvm::Type* type, llvm::Value* otherwise, std::uint32_t last_use) {
+        llvm::PHINode* either = builder.CreatePHI(type, 2);
+        if (!otherwise) otherwise = llvm::UndefValue::get(type);
+        either->addIncoming(place ? place : otherwise, before);
+        assign(place, either, otherwise, last_use);
+        carried.emplace_back(either, &place);
+    };
+    llvm::Value* const none = llvm::Constant::getNullValue(mask_type);
+    llvm::PHINode* loop_mask = nullptr;
+    if (is_divergent) {
+        loop_mask = builder.CreatePHI(mask_type, 2);
+        loop_mask->addIncoming(entry_mask, before);
     }
-    builder.CreateStore(builder.getFalse(), state.back_reached);
-    builder.CreateStore(none, state.back_mask);
-    frame->chains.push_back(++chain_count);
-    emit_block(header, loop_mask);
+    std::vector<std::vector<llvm::PHINode*>> own(function.blocks[header].phis.size());
+    for (std::size_t i = 0; i < own.size(); ++i) {
+        std::uint32_t index = 0;
+        for_each_component_type(function.blocks[header].phis[i].type, [&](const Type& scalar) {
+            llvm::Type* kind = scalar_type(scalar);
+            if (!state.phi_uniform[i]) kind = vector_of(kind);
+            llvm::PHINode* either = builder.CreatePHI(kind, 2);
+            llvm::Value*& place = state.arrival.phis[i][index++];
+            either->addIncoming(place ? place : llvm::UndefValue::get(kind), before);
+            place = either;
+            own[i].push_back(either);
+        });
+    }
+    // Lanes that leave in different iterations gather outside.
+    if (is_divergent) {
+        for (const std::uint32_t target_block : shape.targets) {
+            Arrival& arrival = target_block < header ? frame->blocks[target_block].back : frame->blocks[target_block].arrival;
+            const std::uint32_t last_use = target_block < header ? frame->shape->blocks[target_block].end : target_block;
+            if (!frame->shape->blocks[target_block].is_reconverged || target_block < header) {
+                carry(arrival.reached, builder.getInt1Ty(), builder.getFalse(), last_use);
+                carry(arrival.mask, mask_type, none, last_use);
+            }
+            for (std::size_t i = 0; i < arrival.phis.size(); ++i) {
+                std::uint32_t index = 0;
+                for_each_component_type(function.blocks[target_block].phis[i].type, [&](const Type& scalar) {
+                    llvm::Type* kind = scalar_type(scalar);
+                    if (!frame->blocks[target_block].phi_uniform[i]) kind = vector_of(kind);
+                    carry(arrival.phis[i][index++], kind, nullptr, last_use);
+                });
+            }
+        }
+        for (const Id id : shape.leaving) {
+            const Type& type = module.type(module.type_of(id));
+            if (type.components == 0 || frame->shape->uses.at(id).is_remade) continue;
+            std::vector<llvm::Value*>& places = frame->values_outside[id];
+            places.resize(type.components);
+            std::uint32_t index = 0;
+            for_each_component_type(module.type_of(id), [&](const Type& scalar) {
+                carry(places[index++], vector_of(scalar_type(scalar)), nullptr, frame->shape->uses.at(id).last);
+            });
+        }
+    }
+    if (shape.returns_values)
+        for (std::uint32_t i = 0; i < frame->returned.size(); ++i)
+            carry(frame->returned[i], vector_of(scalar_type(module.type(component_type(function.return_type, i)))), nullptr, ~0u);
+
+    emit_block(header, is_divergent ? loop_mask : entry_mask);
     emit_range(header + 1, end);
-    frame->chains.pop_back();
-    llvm::Value* again = builder.CreateLoad(builder.getInt1Ty(), state.back_reached);
-    builder.CreateStore(builder.CreateLoad(mask_type, state.back_mask), state.mask);
-    // Asked in each iteration, so that a shader without end can be stopped from outside.
-    llvm::Value* execution = load_context(offsetof(ShaderContext, state), pointer_type);
-    llvm::LoadInst* expired = builder.CreateAlignedLoad(builder.getInt32Ty(), execution, llvm::Align(4));
-    expired->setAtomic(llvm::AtomicOrdering::Monotonic);
-    builder.CreateCondBr(builder.CreateAnd(again, builder.CreateICmpEQ(expired, int32(0))), head, after);
+
+    llvm::BasicBlock* bottom = builder.GetInsertBlock();
+    if (state.back.reached) {
+        // Asked in each iteration, so that a shader without end can be stopped from outside.
+        llvm::Value* execution = load_context(offsetof(ShaderContext, state), pointer_type);
+        llvm::LoadInst* expired = builder.CreateAlignedLoad(builder.getInt32Ty(), execution, llvm::Align(4));
+        expired->setAtomic(llvm::AtomicOrdering::Monotonic);
+        builder.CreateCondBr(builder.CreateAnd(state.back.reached, builder.CreateICmpEQ(expired, int32(0))), head, after);
+        if (loop_mask) loop_mask->addIncoming(state.back.mask, bottom);
+        for (std::size_t i = 0; i < own.size(); ++i)
+            for (std::size_t k = 0; k < own[i].size(); ++k) {
+                llvm::Value* value = state.back.phis[i][k];
+                own[i][k]->addIncoming(value ? value : llvm::UndefValue::get(own[i][k]->getType()), bottom);
+            }
+        for (const auto& [either, place] : carried) either->addIncoming(*place, bottom);
+    } else {
+        builder.CreateBr(after);
+    }
     builder.SetInsertPoint(after);
+    // Nobody reads it any more.
+    state.back.reached = state.back.mask = nullptr;
+    for (auto& components : state.back.phis) std::ranges::fill(components, nullptr);
 }
 
 void Emitter::emit_block(std::uint32_t index, llvm::Value* block_mask) {
@@ -272,8 +397,20 @@ void Emitter::emit_block(std::uint32_t index, llvm::Value* block_mask) {
     for (std::size_t i = 0; i < block.phis.size(); ++i) {
         current = &block.phis[i];
         std::vector<Component> components;
-        for (llvm::AllocaInst* slot : state.phi_slots[i])
-            components.emplace_back(builder.CreateLoad(slot->getAllocatedType(), slot));
+        for_each_component_type(block.phis[i].type, [&](const Type& scalar) {
+            llvm::Value* value = state.arrival.phis[i][components.size()];
+            llvm::Type* kind = scalar_type(scalar);
+            if (!value) value = llvm::UndefValue::get(state.phi_uniform[i] ? kind : vector_of(kind));
+            components.emplace_back(value);
+        });
+        if (module.type(block.phis[i].type).kind == TypeKind::pointer) {
+            Id origin = 0;
+            for (std::size_t k = 0; k < block.phis[i].operands.size() && !origin; k += 2)
+                if (module.variable(block.phis[i].operands[k]) || frame->values.contains(block.phis[i].operands[k]))
+                    origin = block.phis[i].operands[k];
+            set_pointer(block.phis[i], std::move(components), origin);
+            continue;
+        }
         define(block.phis[i].result).components = std::move(components);
         finish_definition(block.phis[i].result);
     }
@@ -329,11 +466,11 @@ void Emitter::emit_terminator(std::uint32_t index) {
             return;
         }
         case Op::OpReturnValue: {
-            const Value value = get(end.operand(0));
-            for (std::size_t i = 0; i < frame->return_slots.size(); ++i) {
-                llvm::AllocaInst* slot = frame->return_slots[i];
-                llvm::Value* old = builder.CreateLoad(slot->getAllocatedType(), slot);
-                builder.CreateStore(select(mask, widen(value.components.at(i)), old), slot);
+            const std::vector<Component> value = get_components(end.operand(0));
+            for (std::size_t i = 0; i < frame->returned.size(); ++i) {
+                llvm::Value* all = widen(value.at(i));
+                llvm::Value* before = frame->returned[i];
+                assign(frame->returned[i], before ? select(mask, all, before) : all, nullptr, ~0u);
             }
             return;
         }
@@ -343,6 +480,7 @@ void Emitter::emit_terminator(std::uint32_t index) {
                 llvm::Value* none = llvm::Constant::getNullValue(mask_type);
                 store_live(builder.CreateSelect(mask, none, live()));
             }
+            if (killed_slot) builder.CreateStore(builder.CreateOr(mask, builder.CreateLoad(mask_type, killed_slot)), killed_slot);
             return;
         case Op::OpReturn:
         case Op::OpUnreachable:
@@ -357,7 +495,17 @@ void Emitter::emit_edge(std::uint32_t from, Id to, llvm::Value* condition) {
     const Block& block = function.blocks[*target_index];
     Frame::BlockState& state = frame->blocks[*target_index];
     const bool is_back = *target_index <= from;
+    if (is_back && !block.continue_target) reject("a branch leads back to a block that is no loop header");
+    Arrival& arrival = is_back ? state.back : state.arrival;
+    const std::uint32_t last_use = is_back ? frame->shape->blocks[*target_index].end : *target_index;
     llvm::Value* edge_mask = both(mask, condition);
+    // Lanes that ended inside of a function that was called here do not go round for ever.
+    const bool may_end = is_back && killed_slot;
+    if (may_end) edge_mask = both(edge_mask, builder.CreateNot(builder.CreateLoad(mask_type, killed_slot)));
+    llvm::Value* taken = may_end                            ? any(edge_mask)
+                         : !condition                          ? runs_without_lanes ? any(mask) : builder.getTrue()
+                         : condition->getType()->isVectorTy() ? any(edge_mask)
+                                                             : condition;
 
     // Phis: all are read before any is written, as they may use each other.
     std::vector<std::vector<llvm::Value*>> incoming(block.phis.size());
@@ -365,56 +513,30 @@ void Emitter::emit_edge(std::uint32_t from, Id to, llvm::Value* condition) {
         const Instruction& phi = block.phis[i];
         for (std::size_t k = 0; k + 1 < phi.operands.size(); k += 2) {
             if (phi.operands[k + 1] != function.blocks[from].id) continue;
-            const Value value = get(phi.operands[k]);
-            for (const Component& component : value.components)
+            for (const Component& component : get_components(phi.operands[k]))
                 incoming[i].push_back(state.phi_uniform[i] ? narrow(component, edge_mask) : widen(component));
             break;
         }
     }
-    // Lanes that leave a loop one by one add to those that left it in earlier iterations.
-    const std::uint32_t loop = frame->blocks[from].divergent_loop;
-    const bool leaves = loop != ~0u && (*target_index < loop || *target_index >= end_of_construct(function, loop));
-    // The only way into a block, and the ways into a loop, bring values for all lanes that come; others add to what lanes
-    // before them brought.
-    bool is_plain = is_back || block.predecessors.size() == 1;
-    if (block.continue_target && !is_back) {
-        std::size_t entries = 0;
-        for (const std::uint32_t predecessor : block.predecessors) entries += predecessor < *target_index;
-        is_plain = entries == 1;
-    }
-    is_plain = is_plain && !leaves;
+    // The first way into a block brings values for all lanes that come; others add to what lanes before them brought.
     for (std::size_t i = 0; i < block.phis.size(); ++i)
         for (std::size_t k = 0; k < incoming[i].size(); ++k) {
-            llvm::AllocaInst* slot = state.phi_slots[i][k];
+            llvm::Value*& place = arrival.phis[i][k];
             llvm::Value* value = incoming[i][k];
-            if (state.phi_uniform[i]) {
-                // A scalar is written only if the edge is taken; then no other edge into the block is.
-                if (condition && !is_plain) {
-                    llvm::Value* taken = condition->getType()->isVectorTy() ? any(edge_mask) : condition;
-                    value = select(taken, value, builder.CreateLoad(slot->getAllocatedType(), slot));
-                }
-            } else if (!is_plain) {
-                value = select(edge_mask, value, builder.CreateLoad(slot->getAllocatedType(), slot));
-            }
-            builder.CreateStore(value, slot);
+            // A scalar is written only if the edge is taken; then no other edge into the block is.
+            if (place) value = select(state.phi_uniform[i] ? taken : edge_mask, value, place);
+            assign(place, value, nullptr, last_use);
         }
 
     // Where all lanes of the header meet again nothing needs to be counted.
-    if (state.is_reconverged && !is_back) return;
-    llvm::AllocaInst* reached = is_back ? state.back_reached : state.reached;
-    llvm::AllocaInst* gathered = is_back ? state.back_mask : state.mask;
-    if (!reached) reject("a branch leads back to a block that is no loop header");
-    llvm::Value* taken = !condition                          ? runs_without_lanes ? any(mask) : builder.getTrue()
-                         : condition->getType()->isVectorTy() ? any(edge_mask)
-                                                             : condition;
-    if (block.predecessors.size() == 1 && !leaves) {
-        // One way in: the mask counts only if the block is reached, so a scalar condition need not clear it.
-        builder.CreateStore(taken, reached);
-        builder.CreateStore(condition && !condition->getType()->isVectorTy() ? mask : edge_mask, gathered);
-        return;
-    }
-    builder.CreateStore(builder.CreateOr(builder.CreateLoad(builder.getInt1Ty(), reached), taken), reached);
-    builder.CreateStore(builder.CreateOr(builder.CreateLoad(mask_type, gathered), edge_mask), gathered);
+    if (frame->shape->blocks[*target_index].is_reconverged && !is_back) return;
+    // One way in: the mask counts only if the block is reached, so a scalar condition need not clear it.
+    const bool is_plain = !arrival.reached && !may_end && block.predecessors.size() == 1 && condition && !condition->getType()->isVectorTy();
+    llvm::Value* lanes_coming = is_plain ? mask : edge_mask;
+    const bool is_first = !arrival.reached;
+    assign(arrival.reached, is_first ? taken : builder.CreateOr(arrival.reached, taken), builder.getFalse(), last_use);
+    assign(arrival.mask, is_first ? lanes_coming : builder.CreateOr(arrival.mask, lanes_coming),
+           llvm::Constant::getNullValue(mask_type), last_use);
 }
 
 }  // namespace nacre::cpu

@@ -194,7 +194,7 @@ bool Emitter::emit_extended(const Instruction& at) {
             if (is_struct) {
                 first.insert(first.end(), second.begin(), second.end());
             } else {
-                store(*get(at.operand(3)).pointer, second);
+                store(get_pointer(at.operand(3)), second);
             }
             set(at, std::move(first));
             return true;

@@ -260,7 +260,7 @@ bool Emitter::emit_image(const Instruction& at) {
             return true;
         }
         case Op::OpImageTexelPointer: {
-            const Pointer image = *get(at.operand(0)).pointer;
+            const Pointer image = get_pointer(at.operand(0));
             auto made = std::make_shared<Pointer>();
             made->kind = Pointer::Kind::texel;
             made->storage = spv::StorageClass::Image;

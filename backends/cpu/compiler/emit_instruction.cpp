@@ -11,14 +11,7 @@ void Emitter::emit_instruction(const Instruction& at) {
     switch (at.op) {
         case Op::OpNop: case Op::OpLine: case Op::OpNoLine: case Op::OpMemoryBarrier: case Op::OpAssumeTrueKHR:
             return;
-        case Op::OpFunctionCall: {
-            const Function& callee = module.function(at.operand(0));
-            std::vector<Value> arguments;
-            for (std::size_t i = 1; i < at.operands.size(); ++i) arguments.push_back(get(at.operands[i]));
-            std::vector<Component> result = emit_function(callee, arguments, mask);
-            if (module.type(at.type).components > 0) set(at, std::move(result));
-            return;
-        }
+        case Op::OpFunctionCall: emit_call(at); return;
         case Op::OpCopyObject: case Op::OpCopyLogical: case Op::OpExpectKHR: {
             const Value from = get(at.operand(0));
             if (from.pointer || from.image || from.sampler) {

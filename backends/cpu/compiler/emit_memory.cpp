@@ -17,6 +17,8 @@ namespace {
 
 /// Scalars of a variable up to which each load and store names its slots one by one.
 constexpr std::uint32_t most_direct_components = 4096;
+/// Threads of schedulers have a few MiB of stack.
+constexpr std::uint64_t most_stack_bytes = 2 << 20, most_stack_bytes_of_one = 64 << 10;
 
 }  // namespace
 
@@ -27,13 +29,42 @@ LaneVariable& Emitter::make_lane_variable(Id variable_id, Id type_id, bool is_un
         made = std::make_unique<LaneVariable>();
         made->type = type_id;
         made->is_uniform = is_uniform;
+        if (const Id content = module.constant_content(variable_id)) {
+            hold_constant(*made, content);
+            return *made;
+        }
         made->slot_bytes = type.has_wide ? 8 : 4;
         const std::uint64_t bytes = std::uint64_t{type.components} * made->slot_bytes * (is_uniform ? 1 : lanes);
         if (bytes > (1u << 24))
             reject(fmt::format("a variable of {} scalars takes {} bytes for {} lanes; 16 MiB is the most", type.components, bytes, lanes));
+        if (bytes > most_stack_bytes_of_one) made->memory = large_memory(bytes);
+        if (made->memory) return *made;
+        stack_bytes += bytes;
+        if (stack_bytes > most_stack_bytes && !is_on_heap())
+            reject(fmt::format("the variables take {} bytes of stack for {} lanes; {} is the most", stack_bytes, lanes, most_stack_bytes));
         made->memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::max<std::uint64_t>(bytes, 1)), "variable");
     }
     return *made;
+}
+
+void Emitter::hold_constant(LaneVariable& variable, Id content) {
+    const Value value = constant(content);
+    variable.is_uniform = true;
+    variable.slot_bytes = module.type(variable.type).has_wide ? 8 : 4;
+    std::vector<std::uint32_t> words;
+    words.reserve(value.components.size() * variable.slot_bytes / 4);
+    for (const Component& component : value.components) {
+        // Undefined ones are zero as good as anything.
+        llvm::APInt bits(64, 0);
+        if (const auto* integer = llvm::dyn_cast<llvm::ConstantInt>(component.value)) bits = integer->getValue().zextOrTrunc(64);
+        if (const auto* number = llvm::dyn_cast<llvm::ConstantFP>(component.value)) bits = number->getValueAPF().bitcastToAPInt().zextOrTrunc(64);
+        words.push_back(static_cast<std::uint32_t>(bits.getZExtValue()));
+        if (variable.slot_bytes == 8) words.push_back(static_cast<std::uint32_t>(bits.getZExtValue() >> 32));
+    }
+    llvm::Constant* data = llvm::ConstantDataArray::get(context, words);
+    auto* global = new llvm::GlobalVariable(target, data->getType(), true, llvm::GlobalValue::InternalLinkage, data, "constant");
+    global->setAlignment(llvm::Align(64));
+    variable.memory = global;
 }
 
 void Emitter::fill(LaneVariable& variable, const std::vector<Component>& values) {
@@ -101,11 +132,14 @@ Pointer Emitter::pointer_to(Id id) {
 }
 
 Component Emitter::descriptor(const Pointer& pointer) {
+    if (pointer.descriptor_address) return pointer.descriptor_address;
     const BindingSlots* slot = slots.find(pointer.set, pointer.binding);
     if (!slot) reject(fmt::format("set {} binding {} is not in the pipeline's layout", pointer.set, pointer.binding));
     const std::size_t group_offset = offsetof(ShaderContext, groups) + pointer.set * sizeof(void*);
     llvm::Value* group = load_context(group_offset, pointer_type);
-    const Component index = pointer.descriptor_index;
+    Component index = pointer.descriptor_index;
+    if (index && pointer.valid)
+        index = apply({pointer.valid, index}, [&](auto v) { return select(v[0], v[1], llvm::Constant::getAllOnesValue(v[1]->getType())); });
     if (!index) return Component(at_offset(group, std::int64_t{slot->first} * static_cast<std::int64_t>(sizeof(Descriptor))));
     // Indices out of range find a descriptor of nothing.
     auto*& nothing = shared_["nothing"];
@@ -165,10 +199,22 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
                 index = apply({index}, [&](auto v) {
                     return builder.CreateZExtOrTrunc(v[0], like(v[0], builder.getInt32Ty()));
                 });
-            if (pointer.descriptor_index) reject("arrays of arrays of resources are not supported");
-            pointer.descriptor_index = index;
+            // Arrays of arrays: their elements lie one after another.
+            std::int64_t inner = 1;
+            bool is_innermost = true;
+            for (const Type* element = &module.type(type.element); element->kind == TypeKind::array; element = &module.type(element->element))
+                inner *= element->count, is_innermost = false;
+            if (!is_innermost || pointer.descriptor_index)
+                if (type.kind == TypeKind::array)
+                    pointer.valid = logical_and(pointer.valid, apply({index}, [&](auto v) {
+                                                    return builder.CreateICmpULT(v[0], llvm::ConstantInt::get(v[0]->getType(), type.count));
+                                                }));
+            pointer.descriptor_index = add(pointer.descriptor_index, multiply(index, inner));
             pointer.type = type.element;
-            return module.type(pointer.type).kind == TypeKind::structure ? buffer_pointer(pointer) : pointer;
+            if (module.type(pointer.type).kind != TypeKind::structure) return pointer;
+            pointer = buffer_pointer(pointer);
+            pointer.valid = Component();  // Out of range there is a buffer of no bytes.
+            return pointer;
         }
         reject("a resource is indexed that is no array");
     }
@@ -252,6 +298,34 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
         // Below the bound, every byte of the element lies inside of the range.
         if (is_unbounded) pointer.needs_limit_check = false;
     }
+    return pointer;
+}
+
+std::vector<Component> Emitter::components_of(const Pointer& pointer) {
+    if (pointer.kind != Pointer::Kind::bytes) reject("only pointers into buffers and workgroup memory can be values");
+    const Component base = apply({pointer.base}, [&](auto v) { return builder.CreatePtrToInt(v[0], like(v[0], builder.getInt64Ty())); });
+    Component limit = pointer.limit;
+    if (pointer.storage == StorageClass::Workgroup && !limit) limit = int64(static_cast<std::int64_t>(workgroup_variable_bytes));
+    // Where an index was out of range the pointer leads to nothing.
+    if (pointer.valid)
+        limit = apply({pointer.valid, limit}, [&](auto v) { return select(v[0], v[1], llvm::Constant::getNullValue(v[1]->getType())); });
+    return {base, limit, add(pointer.dynamic_offset, Component(int32(pointer.offset)))};
+}
+
+Pointer Emitter::step(Pointer pointer, const Type& kind, Id index_id) {
+    if (pointer.kind != Pointer::Kind::bytes) reject("only pointers into buffers and workgroup memory can be moved");
+    const bool is_tight = pointer.storage == StorageClass::Workgroup || kind.array_stride == 0;
+    const std::int64_t stride = is_tight ? static_cast<std::int64_t>(module.tight_size(pointer.type)) : kind.array_stride;
+    const bool is_signed = module.type(module.type_of(index_id)).is_signed;
+    const Component index = apply({get_scalar(index_id)}, [&](auto v) {
+        llvm::Type* word = like(v[0], builder.getInt32Ty());
+        return is_signed ? builder.CreateSExtOrTrunc(v[0], word) : builder.CreateZExtOrTrunc(v[0], word);
+    });
+    // Offsets may fall as well as rise: all of it counts against the limit.
+    pointer.dynamic_offset = add(add(pointer.dynamic_offset, Component(int32(pointer.offset))), multiply(index, stride));
+    pointer.offset = 0;
+    if (pointer.storage == StorageClass::Workgroup && !pointer.limit) pointer.limit = int64(static_cast<std::int64_t>(workgroup_variable_bytes));
+    pointer.needs_limit_check = true;
     return pointer;
 }
 
@@ -564,12 +638,14 @@ void Emitter::declare_variables() {
             continue;
         }
         LaneVariable& made = make_lane_variable(id, variable.type, !uniformity.has_divergent_content(id));
+        if (module.constant_content(id)) continue;
         std::vector<Component> initial;
-        if (variable.initializer) initial = get(variable.initializer).components;
+        if (variable.initializer) initial = get_components(variable.initializer);
         else if (module.type(variable.type).components <= most_direct_components)
             for_each_component_type(variable.type, [&](const Type& scalar) { initial.push_back(zero(scalar)); });
         fill(made, initial);
     }
+    share_environment();
 }
 
 bool Emitter::emit_memory(const Instruction& at) {
@@ -581,50 +657,85 @@ bool Emitter::emit_memory(const Instruction& at) {
             }
             LaneVariable& variable = make_lane_variable(at.result, module.variable(at.result)->type,
                                                         !uniformity.has_divergent_content(at.result));
+            if (module.constant_content(at.result)) return true;
             if (at.operand(1)) {
                 Pointer pointer = pointer_to(at.result);
-                store(pointer, get(at.operand(1)).components);
+                store(pointer, get_components(at.operand(1)));
             } else if (const Type& type = module.type(variable.type); type.components <= 64) {
                 // In loops and repeated calls: not what an earlier round left there.
                 std::vector<Component> initial;
                 for_each_component_type(variable.type, [&](const Type& scalar) { initial.push_back(zero(scalar)); });
-                if (frame->function == &module.entry()) fill(variable, initial);
+                fill(variable, initial);
             }
             return true;
         }
         case Op::OpAccessChain:
-        case Op::OpInBoundsAccessChain: {
-            Pointer pointer = *get(at.operand(0)).pointer;
-            for (const Id index : at.operands.subspan(1)) pointer = access(std::move(pointer), index);
+        case Op::OpInBoundsAccessChain:
+        case Op::OpPtrAccessChain:
+        case Op::OpInBoundsPtrAccessChain: {
+            Pointer pointer = get_pointer(at.operand(0));
+            const bool steps = at.op == Op::OpPtrAccessChain || at.op == Op::OpInBoundsPtrAccessChain;
+            if (steps) pointer = step(std::move(pointer), module.type(module.type_of(at.operand(0))), at.operand(1));
+            for (const Id index : at.operands.subspan(steps ? 2 : 1)) pointer = access(std::move(pointer), index);
             define(at.result).pointer = std::make_shared<Pointer>(std::move(pointer));
             finish_definition(at.result);
             return true;
         }
         case Op::OpLoad: {
-            const Value from = get(at.operand(0));
+            const Pointer from = get_pointer(at.operand(0));
             const Type& type = module.type(at.type);
             if (type.is_opaque()) {
-                const Component address = descriptor(*from.pointer);
+                const Component address = descriptor(from);
                 Value& value = define(at.result);
                 value.image = address, value.sampler = address;
                 value.image_type = type.kind == TypeKind::sampled_image ? type.element : at.type;
                 finish_definition(at.result);
                 return true;
             }
-            set(at, load(*from.pointer));
+            set(at, load(from));
             return true;
         }
-        case Op::OpStore: store(*get(at.operand(0)).pointer, get(at.operand(1)).components); return true;
-        case Op::OpCopyMemory: store(*get(at.operand(0)).pointer, load(*get(at.operand(1)).pointer)); return true;
+        case Op::OpSelect:
+            if (module.type(at.type).kind != TypeKind::pointer) return false;
+            set_pointer(at, evaluate(at.op, at.type, at.operands, at.result), at.operand(1));
+            return true;
+        case Op::OpPtrEqual:
+        case Op::OpPtrNotEqual:
+        case Op::OpPtrDiff: {
+            const auto address = [&](Id id) {
+                const std::vector<Component> parts = get_components(id);
+                return apply({parts.at(0), parts.at(2)}, [&](auto v) {
+                    return builder.CreateAdd(v[0], builder.CreateSExt(v[1], v[0]->getType()));
+                });
+            };
+            const Type& kind = module.type(module.type_of(at.operand(0)));
+            const std::int64_t stride = std::max<std::int64_t>(1, kind.array_stride && kind.storage != StorageClass::Workgroup
+                                                                      ? std::int64_t{kind.array_stride}
+                                                                      : static_cast<std::int64_t>(module.tight_size(kind.element)));
+            set(at, {apply({address(at.operand(0)), address(at.operand(1))}, [&](auto v) -> llvm::Value* {
+                    if (at.op != Op::OpPtrDiff)
+                        return builder.CreateICmp(at.op == Op::OpPtrEqual ? llvm::CmpInst::ICMP_EQ : llvm::CmpInst::ICMP_NE, v[0], v[1]);
+                    llvm::Value* elements = builder.CreateSDiv(builder.CreateSub(v[0], v[1]), llvm::ConstantInt::getSigned(v[0]->getType(), stride));
+                    return builder.CreateSExtOrTrunc(elements, like(v[0], scalar_type(module.type(at.type))));
+                })});
+            return true;
+        }
+        case Op::OpStore:
+            if (module.constant_content(at.operand(0))) return true;
+            store(get_pointer(at.operand(0)), get_components(at.operand(1)));
+            return true;
+        case Op::OpCopyMemory: store(get_pointer(at.operand(0)), load(get_pointer(at.operand(1)))); return true;
         case Op::OpArrayLength: {
             // Of the last member of the block that the pointer leads to.
-            Pointer block = *get(at.operand(0)).pointer;
+            Pointer block = get_pointer(at.operand(0));
             const Type& type = module.type(block.type);
             const Member& member = type.members.at(at.operand(1));
             const std::uint32_t stride = std::max(1u, module.type(member.type).array_stride);
             const std::int64_t begin = block.offset + member.offset;
-            set(at, {apply({block.limit}, [&](auto v) {
-                    llvm::Value* first = llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(begin));
+            const Component moved = block.dynamic_offset ? block.dynamic_offset : Component(int32(0));
+            set(at, {apply({block.limit, moved}, [&](auto v) {
+                    llvm::Value* first = builder.CreateAdd(builder.CreateZExt(v[1], v[0]->getType()),
+                                                           llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(begin)));
                     llvm::Value* room = builder.CreateSelect(builder.CreateICmpUGE(v[0], first), builder.CreateSub(v[0], first),
                                                              llvm::Constant::getNullValue(v[0]->getType()));
                     llvm::Value* count = builder.CreateUDiv(room, llvm::ConstantInt::get(v[0]->getType(), stride));

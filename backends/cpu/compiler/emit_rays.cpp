@@ -64,7 +64,7 @@ bool Emitter::is_ray_query(Id id) const {
 
 Pointer Emitter::ray_query_pointer(Id id) {
     const Variable& variable = *module.variable(id);
-    llvm::AllocaInst*& slot = ray_queries[id];
+    llvm::Value*& slot = ray_queries[id];
     if (!slot) {
         const std::uint64_t bytes = module.tight_size(variable.type);
         if (bytes == 0 || bytes > most_query_bytes) reject("an array of that many ray queries is not supported");

@@ -138,7 +138,8 @@ bool Emitter::emit_subgroup(const Instruction& at) {
             return true;
         }
         case Op::OpGroupNonUniformShuffle: case Op::OpGroupNonUniformShuffleXor: case Op::OpGroupNonUniformShuffleUp:
-        case Op::OpGroupNonUniformShuffleDown: case Op::OpGroupNonUniformQuadBroadcast: case Op::OpGroupNonUniformQuadSwap: {
+        case Op::OpGroupNonUniformShuffleDown: case Op::OpGroupNonUniformQuadBroadcast: case Op::OpGroupNonUniformQuadSwap:
+        case Op::OpGroupNonUniformRotateKHR: {
             llvm::Value* operand = nullptr;
             if (at.op != Op::OpGroupNonUniformQuadSwap || !module.constant_word(at.operand(2)))
                 operand = builder.CreateZExtOrTrunc(widen(get_scalar(at.operand(2))), vector_of(builder.getInt32Ty()));
@@ -150,6 +151,14 @@ bool Emitter::emit_subgroup(const Instruction& at) {
                 case Op::OpGroupNonUniformShuffleXor: source = builder.CreateXor(numbers, operand); break;
                 case Op::OpGroupNonUniformShuffleUp: source = builder.CreateSub(numbers, operand); break;
                 case Op::OpGroupNonUniformShuffleDown: source = builder.CreateAdd(numbers, operand); break;
+                case Op::OpGroupNonUniformRotateKHR: {
+                    // Round the subgroup, or each cluster of it.
+                    const std::uint32_t cluster = std::min(lanes, std::max(1u, module.constant_word(at.operand(3)).value_or(lanes)));
+                    llvm::Value* inside = splat(int32(cluster - 1));
+                    source = builder.CreateOr(builder.CreateAnd(numbers, builder.CreateNot(inside)),
+                                              builder.CreateAnd(builder.CreateAdd(numbers, operand), inside));
+                    break;
+                }
                 case Op::OpGroupNonUniformQuadBroadcast:
                     source = builder.CreateOr(builder.CreateAnd(numbers, splat(int32(~3))), builder.CreateAnd(operand, splat(int32(3))));
                     break;

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <utility>
+
 #include <llvm/IR/Constants.h>
 
 #include "backends/cpu/compiler/emitter.h"
@@ -39,18 +41,20 @@ Value Emitter::constant(Id id) {
             break;
         case Op::OpSpecConstantOp:
             value.components = evaluate(static_cast<Op>(at.operand(0)), at.type, at.operands.subspan(1), id);
+            // Instructions stand for it only here.
+            for (const Component& component : value.components)
+                if (!llvm::isa<llvm::Constant>(component.value)) return value;
             break;
         case Op::OpUndef:
         case Op::OpConstantNull:
         default:
-            if (type.kind == TypeKind::pointer) reject("null pointers are not supported");
             for_each_component_type(at.type, [&](const Type& scalar) { value.components.push_back(zero(scalar)); });
     }
     constants_.emplace(id, value);
     return value;
 }
 
-Value& Emitter::define(Id id) { return frame->values[id]; }
+Value& Emitter::define(Id id) { return id == remade_ ? remade_value_ : frame->values[id]; }
 
 Value Emitter::get(Id id) {
     if (module.constant(id)) return constant(id);
@@ -61,45 +65,51 @@ Value Emitter::get(Id id) {
     }
     const auto found = frame->values.find(id);
     if (found == frame->values.end()) reject("a value is used before it is defined");
-    const auto definition = frame->definitions.find(id);
-    if (definition == frame->definitions.end()) return found->second;  // A parameter.
-    const Frame::Definition& where = definition->second;
-    const std::uint32_t loop = frame->blocks[where.block].divergent_loop;
-    bool is_outside = false;
-    if (loop != ~0u && !where.outside_slots.empty())
-        is_outside = frame->block < loop || frame->block >= end_of_construct(*frame->function, loop);
-    const bool is_open =
-        std::ranges::find(frame->chains, where.chain) != frame->chains.end() || where.block == frame->block;
-    if (is_open && !is_outside) return found->second;
-    if (found->second.pointer || found->second.image || found->second.sampler) {
-        // Made again here: what it was made from dominates nothing, but its operands can be had.
-        const Block& block = frame->function->blocks[where.block];
-        for (const Instruction& at : block.body) {
-            if (at.result != id) continue;
-            const Value saved = found->second;
-            const Frame::Definition saved_definition = where;
-            const Instruction* const outer = current;
-            emit_instruction(at);
-            current = outer;
-            Value made = frame->values.at(id);
-            frame->values[id] = saved;
-            frame->definitions[id] = saved_definition;
-            return made;
-        }
-        reject("a pointer is used where it cannot be made again");
-    }
+    const auto use = frame->shape->uses.find(id);
+    if (use == frame->shape->uses.end() || !use->second.is_leaving) return found->second;  // Or a parameter.
+    const std::uint32_t loop = frame->shape->blocks[use->second.home].divergent_loop;
+    if (frame->block >= loop && frame->block < frame->shape->blocks[loop].end) return found->second;
     Value value = found->second;
-    const auto& slots_of = is_outside ? where.outside_slots : where.slots;
-    for (std::size_t i = 0; i < value.components.size(); ++i)
-        if (i < slots_of.size() && slots_of[i]) {
-            Component loaded(builder.CreateLoad(slots_of[i]->getAllocatedType(), slots_of[i]));
-            if (!is_outside && i < where.linear_slots.size() && where.linear_slots[i]) {
-                loaded.linear_base = builder.CreateLoad(builder.getInt32Ty(), where.linear_slots[i]);
-                loaded.linear_stride = value.components[i].linear_stride;
-            }
-            value.components[i] = loaded;
-        }
-    return value;
+    if (!use->second.is_remade) {
+        const std::vector<llvm::Value*>& outside = frame->values_outside.at(id);
+        for (std::size_t i = 0; i < value.components.size(); ++i) value.components[i] = Component(outside.at(i));
+        return value;
+    }
+    // Made again here, where its operands have the values that each lane left the loop with.
+    for (const Instruction& at : frame->function->blocks[use->second.home].body) {
+        if (at.result != id) continue;
+        const Id outer = std::exchange(remade_, id);
+        const Value outer_value = std::exchange(remade_value_, Value());
+        const Instruction* const outer_instruction = current;
+        emit_instruction(at);
+        current = outer_instruction;
+        remade_ = outer;
+        return std::exchange(remade_value_, outer_value);
+    }
+    reject("a pointer is used where it cannot be made again");
+}
+
+Pointer Emitter::get_pointer(Id id) {
+    const Value value = get(id);
+    if (value.pointer) return *value.pointer;
+    const Type& type = module.type(module.type_of(id));
+    if (type.kind != TypeKind::pointer || value.components.size() != 3) reject("a pointer is expected and something else is found");
+    Pointer pointer;
+    pointer.storage = type.storage, pointer.type = type.element;
+    pointer.base = apply({value.components[0]}, [&](auto v) { return builder.CreateIntToPtr(v[0], like(v[0], pointer_type)); });
+    pointer.limit = value.components[1];
+    pointer.dynamic_offset = value.components[2];
+    pointer.needs_limit_check = true;
+    if (value.origin) {
+        pointer.row_major = value.origin->row_major, pointer.matrix_stride = value.origin->matrix_stride;
+        pointer.component_stride = value.origin->component_stride;
+    }
+    return pointer;
+}
+
+std::vector<Component> Emitter::get_components(Id id) {
+    Value value = get(id);
+    return value.pointer ? components_of(*value.pointer) : std::move(value.components);
 }
 
 void Emitter::set(const Instruction& at, std::vector<Component> components) {
@@ -111,40 +121,42 @@ void Emitter::set(const Instruction& at, std::vector<Component> components) {
     finish_definition(at.result);
 }
 
-void Emitter::finish_definition(Id id) {
-    Frame::Definition definition;
-    definition.block = frame->block;
-    definition.chain = frame->chains.back();
-    Value& value = frame->values[id];
-    if (frame->crossing.contains(id) && !value.components.empty()) {
-        definition.slots.reserve(value.components.size());
-        const bool differs = frame->leaving.contains(id);
-        for (const Component& component : value.components) {
-            if (llvm::isa<llvm::Constant>(component.value)) {
-                definition.slots.push_back(nullptr);
-                definition.outside_slots.push_back(nullptr);
-                continue;
-            }
-            llvm::AllocaInst* slot = make_slot(component.value->getType(), "value");
-            builder.CreateStore(component.value, slot);
-            definition.slots.push_back(slot);
-            if (component.linear_base && component.linear_base->getType()->isIntegerTy(32)) {
-                definition.linear_slots.resize(value.components.size());
-                llvm::AllocaInst*& base = definition.linear_slots[definition.slots.size() - 1];
-                base = make_slot(builder.getInt32Ty(), "linear");
-                builder.CreateStore(component.linear_base, base);
-            }
-            if (!differs) continue;
-            // Lanes that have left the loop keep what they had.
-            llvm::Type* wide = component.is_uniform() ? vector_of(component.value->getType()) : component.value->getType();
-            llvm::AllocaInst* outside = make_slot(wide, "left");
-            llvm::Value* old = builder.CreateLoad(wide, outside);
-            builder.CreateStore(select(mask, widen(component), old), outside);
-            definition.outside_slots.push_back(outside);
-        }
-        if (!differs) definition.outside_slots.clear();
+void Emitter::set_pointer(const Instruction& at, std::vector<Component> components, Id origin) {
+    if (origin) {
+        const Value from = get(origin);
+        define(at.result).origin = from.pointer ? from.pointer : from.origin;
     }
-    frame->definitions[id] = std::move(definition);
+    set(at, std::move(components));
+}
+
+void Emitter::finish_definition(Id id) {
+    if (id == remade_) return;
+    const auto use = frame->shape->uses.find(id);
+    if (use == frame->shape->uses.end() || use->second.last == use->second.home) return;
+    // Used in other blocks: code that may be skipped, and this block with it, gives place to a phi behind it.
+    Value& value = frame->values[id];
+    const auto keep = [&](Component& component) {
+        for (llvm::Value** place : {&component.value, &component.linear_base})
+            if (*place) frame->changes.push_back({place, nullptr, nullptr, use->second.last});
+    };
+    for (Component& component : value.components) keep(component);
+    keep(value.image), keep(value.sampler);
+    if (value.pointer) {
+        auto own = std::make_shared<Pointer>(*value.pointer);
+        for (Component* part : {&own->valid, &own->dynamic_component, &own->base, &own->limit, &own->dynamic_offset, &own->descriptor_index,
+                                &own->descriptor_address, &own->image_descriptor, &own->sample})
+            keep(*part);
+        for (Component& coordinate : own->coordinates) keep(coordinate);
+        value.pointer = std::move(own);
+    }
+    if (!use->second.is_leaving || use->second.is_remade) return;
+    // Lanes that have left the loop keep what they had.
+    std::vector<llvm::Value*>& outside = frame->values_outside[id];
+    outside.resize(value.components.size());
+    for (std::size_t i = 0; i < outside.size(); ++i) {
+        llvm::Value* all = widen(value.components[i]);
+        assign(outside[i], outside[i] ? select(mask, all, outside[i]) : all, nullptr, use->second.last);
+    }
 }
 
 }  // namespace nacre::cpu

@@ -38,6 +38,10 @@ void Emitter::for_each_component_type(Id id, const std::function<void(const Type
         case TypeKind::structure:
             for (const Member& member : type.members) for_each_component_type(member.type, visit);
             break;
+        case TypeKind::pointer:
+            if (!type.components) reject("a type without a value is used as one");
+            visit(module.type(pointer_word_type)), visit(module.type(pointer_word_type)), visit(module.type(pointer_offset_type));
+            break;
         default: reject("a type without a value is used as one");
     }
 }
@@ -61,6 +65,7 @@ Id Emitter::component_type(Id id, std::uint32_t index) const {
                 id = type.members[member].type, index -= type.members[member].first_component;
                 break;
             }
+            case TypeKind::pointer: return index < 2 ? pointer_word_type : pointer_offset_type;
             default: return id;
         }
     }
@@ -124,7 +129,7 @@ llvm::Value* Emitter::both(llvm::Value* lanes_on, llvm::Value* condition) {
 llvm::AllocaInst* Emitter::make_slot(llvm::Type* type, const char* slot_name) {
     llvm::IRBuilder<> at(slot_block, slot_block->begin());
     llvm::AllocaInst* slot = at.CreateAlloca(type, nullptr, slot_name);
-    slot->setAlignment(llvm::Align(type->isVectorTy() || type->isArrayTy() ? 64 : 8));
+    slot->setAlignment(llvm::Align(type->isVectorTy() || type->isAggregateType() ? 64 : 8));
     return slot;
 }
 

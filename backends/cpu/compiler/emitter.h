@@ -82,6 +82,7 @@ struct Pointer {
     // Kind::descriptor: one element or an array of them.
     std::uint32_t set = 0, binding = 0;
     Component descriptor_index;      ///< i32; null: 0.
+    Component descriptor_address;    ///< ptr, instead of set, binding and index: what a function was given.
 
     // Kind::texel
     Component image_descriptor;
@@ -96,6 +97,8 @@ struct Value {
     std::shared_ptr<const Pointer> pointer;
     Component image, sampler;        ///< Images, samplers, sampled images: ptr to Descriptor.
     Id image_type = 0;
+    /// Pointers that depend on control flow: one of those that they may be, for the layout of matrices.
+    std::shared_ptr<const Pointer> origin;
 };
 
 /// What went wrong, thrown inside of the emitter only and turned into an Error at its surface.
@@ -149,7 +152,7 @@ class Emitter {
     llvm::Value* mask_bits(llvm::Value* mask);           ///< i32 with one bit for each lane.
     llvm::Value* first_lane(llvm::Value* mask);          ///< i32: the lowest lane that is on (of an empty mask: the highest of all).
     llvm::Value* all_lanes();                            ///< The mask of all lanes.
-    [[nodiscard]] static bool is_all(llvm::Value* mask);
+    [[nodiscard]] static bool is_all(llvm::Value* mask);  ///< A constant that is true in all lanes.
     llvm::Value* both(llvm::Value* mask, llvm::Value* condition);  ///< Mask and condition (scalar or vector).
     llvm::Value* select(llvm::Value* condition, llvm::Value* yes, llvm::Value* no);
     llvm::AllocaInst* make_slot(llvm::Type* type, const char* slot_name);
@@ -172,6 +175,8 @@ class Emitter {
     Value& define(Id id);
     Value get(Id id);
     Component get_scalar(Id id) { return get(id).components.at(0); }
+    Pointer get_pointer(Id id);
+    std::vector<Component> get_components(Id id);        ///< Of pointers too.
     Value constant(Id id);
     Component zero(const Type& scalar);
     void set(const Instruction& at, std::vector<Component> components);
@@ -180,6 +185,11 @@ class Emitter {
     // ---- Control flow (emit_control_flow.cpp)
     /// Emits a function for the lanes of `mask`; returns its result.
     std::vector<Component> emit_function(const Function& function, const std::vector<Value>& arguments, llvm::Value* mask);
+
+    // ---- Functions that are called and not emitted in place (emit_calls.cpp)
+    void emit_call(const Instruction& at);
+    void share_environment();                            ///< When everything that functions may use has been made.
+    virtual void add_stage_values(std::vector<llvm::Value**>&) {}  ///< What a stage keeps in members and functions may use.
 
     // ---- Instructions
     void emit_instruction(const Instruction& at);                       // emit_instruction.cpp
@@ -227,9 +237,13 @@ class Emitter {
     void declare_variables();
     LaneVariable& make_lane_variable(Id variable_id, Id type, bool is_uniform);
     void fill(LaneVariable& variable, const std::vector<Component>& values);
+    void hold_constant(LaneVariable& variable, Id content);  ///< Memory of the module that nobody writes.
     std::vector<Component> load(const Pointer& pointer);
     void store(const Pointer& pointer, const std::vector<Component>& values);
     Pointer pointer_to(Id variable);
+    std::vector<Component> components_of(const Pointer& pointer);
+    void set_pointer(const Instruction& at, std::vector<Component> components, Id origin);
+    Pointer step(Pointer pointer, const Type& pointer_kind, Id index);  ///< As many elements on as the index says.
     Pointer access(Pointer pointer, Id index);
     Component load_bytes(const Pointer& pointer, std::int64_t extra, const Type& scalar);
     void store_bytes(const Pointer& pointer, std::int64_t extra, const Type& scalar, const Component& value);
@@ -282,6 +296,10 @@ class Emitter {
     // ---- Stages: what only they know.
     virtual std::vector<Component> input_components(const Variable& variable) = 0;
     /// Base pointer and size of the workgroup's memory.
+    /// Memory for a large variable that is no stack; null: there is none.
+    virtual llvm::Value* large_memory(std::uint64_t) { return nullptr; }
+    /// Stack slots of the function that is being made lie in memory that was measured before.
+    [[nodiscard]] virtual bool is_on_heap() const { return false; }
     virtual llvm::Value* workgroup_memory() { reject("workgroup memory outside of a compute shader"); }
     void store_live(llvm::Value* lanes_on) { builder.CreateStore(lanes_on, live_slot); }
     llvm::Value* live() { return builder.CreateLoad(mask_type, live_slot); }
@@ -300,54 +318,77 @@ class Emitter {
     llvm::Value* shader_context = nullptr;     ///< ptr to ShaderContext
     llvm::Function* function_ = nullptr;       ///< That is being made.
     llvm::BasicBlock* slot_block = nullptr;    ///< Where stack slots are made.
-    llvm::AllocaInst* live_slot = nullptr;     ///< Lanes that are neither helpers nor discarded.
+    llvm::Value* live_slot = nullptr;          ///< ptr to lanes that are neither helpers nor discarded.
+    llvm::Value* killed_slot = nullptr;        ///< ptr to lanes that ended inside of functions; null: none can.
     llvm::AllocaInst* nowhere_slot = nullptr;  ///< Where stores go that must vanish.
     llvm::AllocaInst* image_arguments = nullptr;
     std::unordered_map<Id, std::unique_ptr<LaneVariable>> lane_variables;
     std::unordered_map<Id, std::uint64_t> workgroup_offsets;
-    std::unordered_map<Id, llvm::AllocaInst*> ray_queries;
+    std::unordered_map<Id, llvm::Value*> ray_queries;
     std::uint64_t workgroup_variable_bytes = 0;
+    std::uint64_t stack_bytes = 0;             ///< Of variables, all together.
     bool has_side_effects = false;             ///< Some store, atomic or image store was emitted.
 
+    /// What is known of a function before it is emitted.
+    struct Shape {
+        struct BlockShape {
+            bool reconverges = false;            ///< Header: all lanes meet again at the merge block.
+            bool is_reconverged = false;         ///< Merge block of such a header.
+            std::uint32_t divergent_loop = ~0u;  ///< Innermost loop around it that lanes leave one by one: header's index.
+            // Headers of loops:
+            std::uint32_t end = 0;               ///< Index of the first block behind the loop.
+            bool returns_values = false;         ///< Some block of the loop returns from the function.
+            std::vector<std::uint32_t> targets;  ///< Loops that lanes leave one by one: blocks outside that they go to.
+            std::vector<Id> leaving;             ///< The same: values made inside and used outside.
+        };
+        struct Use {
+            std::uint32_t home = 0;              ///< Block that makes the value.
+            std::uint32_t last = 0;              ///< Last block that uses it.
+            bool is_leaving = false;             ///< Used behind a loop that lanes leave one by one, made inside.
+            bool is_remade = false;              ///< A pointer or image: behind such loops made again from its operands.
+        };
+        std::vector<BlockShape> blocks;
+        std::unordered_map<Id, Use> uses;
+    };
+    /// What lanes bring along to a block: single static assignment is made as code is emitted, see `merge`.
+    struct Arrival {
+        llvm::Value* reached = nullptr;          ///< i1: some lane comes; null: none can.
+        llvm::Value* mask = nullptr;             ///< Those that come.
+        std::vector<std::vector<llvm::Value*>> phis;  ///< Components of each phi; null: nothing came yet.
+    };
     /// One activation of a function.
     struct Frame {
         const Function* function = nullptr;
+        const Shape* shape = nullptr;
         struct BlockState {
-            llvm::AllocaInst* reached = nullptr;
-            llvm::AllocaInst* mask = nullptr;
-            llvm::AllocaInst* back_reached = nullptr;  ///< Loop headers.
-            llvm::AllocaInst* back_mask = nullptr;
-            std::vector<std::vector<llvm::AllocaInst*>> phi_slots;
+            Arrival arrival, back;               ///< `back`: loop headers, from the end of the loop.
             std::vector<bool> phi_uniform;
-            bool reconverges = false;     ///< Header: all lanes meet again at the merge block.
-            bool is_reconverged = false;  ///< Merge block of such a header.
-            std::uint32_t divergent_loop = ~0u;  ///< Innermost loop around it that lanes leave one by one: header's index.
         };
         std::vector<BlockState> blocks;
         llvm::Value* entry_mask = nullptr;
-        std::unordered_set<Id> crossing;               ///< Ids used in other blocks than their own.
-        std::unordered_set<Id> leaving;                ///< Ids used behind a loop that lanes leave one by one, defined inside.
-        std::vector<llvm::AllocaInst*> return_slots;
-        struct Definition {
-            std::uint32_t block = 0;
-            std::uint64_t chain = 0;
-            std::vector<llvm::AllocaInst*> slots, outside_slots;
-            std::vector<llvm::AllocaInst*> linear_slots;  ///< Of `linear_base`, where there is one; empty: nowhere.
-        };
-        std::unordered_map<Id, Definition> definitions;
+        std::vector<llvm::Value*> returned;      ///< Components of the result; null: nothing yet.
         std::unordered_map<Id, Value> values;
-        std::uint32_t block = 0;                       ///< That is being emitted.
-        std::vector<std::uint64_t> chains;             ///< That are open.
+        /// Behind loops that lanes leave one by one: what each lane had when it left.
+        std::unordered_map<Id, std::vector<llvm::Value*>> values_outside;
+        /// Places that hold other values than at the begin of a part of the code that may be skipped.
+        struct Change {
+            llvm::Value** place;
+            llvm::Value* before;                 ///< Null: nothing.
+            llvm::Value* otherwise;              ///< What stands for nothing; null: undefined.
+            std::uint32_t last_use;              ///< Block behind which nobody reads it.
+        };
+        std::vector<Change> changes;
+        std::uint32_t block = 0;                 ///< That is being emitted.
     };
     Frame* frame = nullptr;
     llvm::Value* mask = nullptr;                       ///< Of the block that is being emitted.
     const Instruction* current = nullptr;
-    std::uint64_t chain_count = 0;
     std::uint32_t call_depth = 0;
     bool runs_without_lanes = false;                   ///< The block is cheap: it runs even where its mask is empty.
 
   private:
-    void analyze_frame(Frame& made);
+    const Shape& shape_of(const Function& function);
+    void find_uses(const Function& function, Shape& shape) const;
     void emit_range(std::uint32_t begin, std::uint32_t end);
     std::uint32_t emit_chain(std::uint32_t first, std::uint32_t end);
     void emit_block(std::uint32_t index, llvm::Value* block_mask);
@@ -356,6 +397,25 @@ class Emitter {
     /// condition: null (always), i1 or a vector of i1.
     void emit_edge(std::uint32_t from, Id to, llvm::Value* condition);
     bool is_cheap(std::uint32_t index) const;
+    /// Changes what a place holds from here on, up to and with block `last_use`.
+    void assign(llvm::Value*& place, llvm::Value* value, llvm::Value* otherwise, std::uint32_t last_use);
+    /// Behind code that may have been skipped: places that changed there get a phi. `next` is the block that follows.
+    void merge(std::size_t first_change, llvm::BasicBlock* skipped, llvm::BasicBlock* ran, std::uint32_t next);
+    std::unordered_map<Id, std::unique_ptr<Shape>> shapes_;
+    Id remade_ = 0;                                    ///< Pointer that is being made again behind a loop,
+    Value remade_value_;                               ///< and what it is there.
+    std::unordered_map<Id, llvm::Function*> kept_;     ///< Functions that have been made.
+    std::vector<llvm::Value**> shared_places_;         ///< What functions may use,
+    llvm::StructType* environment_type_ = nullptr;     ///< in the order of this structure,
+    llvm::Value* environment_ = nullptr;               ///< of which every function gets the address.
+    struct Argument {
+        std::vector<llvm::Value*> values;              ///< Of `argument_types`.
+        bool fits = true;                              ///< Can be handed to a function.
+    };
+    std::vector<llvm::Type*> argument_types(const Instruction& parameter);
+    Argument argument(const Instruction& parameter, Id id);
+    Value parameter_value(const Instruction& parameter, std::span<llvm::Value* const> values);
+    llvm::Function* kept_function(const Function& callee);
     std::unordered_map<Id, Value> constants_;
     std::unordered_map<std::string, llvm::Value*> shared_;
 };

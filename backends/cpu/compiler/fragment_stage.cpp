@@ -86,6 +86,10 @@ std::vector<llvm::Value*> FragmentEmitter::evaluate_inputs() {
     std::vector<llvm::Value*> values;
     for (std::uint32_t i = 0; i < input_scalars_.size(); ++i) {
         const InterfaceScalar& at = input_scalars_[i];
+        if (at.is_wide) {  // Half of 64 bits.
+            values.push_back(primitive_word(sizeof(PrimitiveData) + i * sizeof(Plane), builder.getInt32Ty()).value);
+            continue;
+        }
         values.push_back(evaluate_input(i, at.centroid && !program.runs_per_sample ? centroid : center, module.type(at.type)).value);
     }
     values.push_back(evaluate_plane(offsetof(PrimitiveData, depth), center).value);
@@ -140,7 +144,7 @@ void FragmentEmitter::declare_inputs() {
         const auto scalars = interface_scalars(module, *variable);
         if (!scalars) {
             current = &variable->instruction;
-            reject(fmt::format("input '{}' has no location, or holds 64-bit values", variable->name));
+            reject(fmt::format("input '{}' has no location", variable->name));
         }
         std::vector<std::uint32_t>& numbers = input_numbers_[id];
         for (const InterfaceScalar& at : *scalars) {
@@ -151,6 +155,11 @@ void FragmentEmitter::declare_inputs() {
             program.runs_per_sample = program.runs_per_sample || (at.sample && !is_flat);
             program.uses_centroid = program.uses_centroid || (at.centroid && !is_flat);
             numbers.push_back(static_cast<std::uint32_t>(program.inputs.size()));
+            if (at.is_wide) input.interpolation = Interpolation::flat;
+            program.inputs.push_back(input);
+            input_scalars_.push_back(at);
+            if (!at.is_wide) continue;
+            input.location = at.upper_location, input.component = at.upper_component;
             program.inputs.push_back(input);
             input_scalars_.push_back(at);
         }
@@ -207,7 +216,16 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
     const auto numbers = input_numbers_.find(variable.instruction.result);
     if (!scalars || numbers == input_numbers_.end()) reject(fmt::format("input '{}' is not supported in fragment shaders", variable.name));
     std::vector<Component> made;
-    for (const std::uint32_t number : numbers->second) made.push_back(Component(inputs_[number]));
+    for (std::size_t i = 0; i < scalars->size(); ++i) {
+        const InterfaceScalar& at = (*scalars)[i];
+        if (at.is_wide) {
+            const auto half = [&](std::uint32_t number) { return builder.CreateZExt(inputs_[number], vector_of(builder.getInt64Ty())); };
+            llvm::Value* bits = builder.CreateOr(half(numbers->second[i]), builder.CreateShl(half(numbers->second[i] + 1), 32));
+            made.emplace_back(builder.CreateBitCast(bits, vector_of(scalar_type(module.type(at.type)))));
+            continue;
+        }
+        made.emplace_back(inputs_[numbers->second[i]]);
+    }
     return made;
 }
 
@@ -238,7 +256,7 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
             const std::uint32_t number = at.operand(1);
             if (number != GLSLstd450InterpolateAtCentroid && number != GLSLstd450InterpolateAtSample && number != GLSLstd450InterpolateAtOffset)
                 return false;
-            const Pointer pointer = *get(at.operand(2)).pointer;
+            const Pointer pointer = get_pointer(at.operand(2));
             Place place = centroid;
             if (number == GLSLstd450InterpolateAtOffset) {
                 const Value offset = get(at.operand(3));
@@ -297,7 +315,8 @@ void FragmentEmitter::store_outputs() {
             continue;
         }
         const auto scalars = interface_scalars(module, *variable);
-        if (!scalars) reject(fmt::format("output '{}' has no location, or holds 64-bit values", variable->name));
+        if (!scalars || module.type(variable->type).has_wide)
+            reject(fmt::format("output '{}' has no location, or holds 64-bit values", variable->name));
         for (std::size_t i = 0; i < scalars->size(); ++i) {
             const InterfaceScalar& at = (*scalars)[i];
             const std::uint32_t output = variable->index == 1 ? dual_source_output + at.location : at.location;
@@ -310,6 +329,11 @@ void FragmentEmitter::store_outputs() {
         }
     }
     builder.CreateAlignedStore(mask_bits(live()), at_offset(batch, offsetof(FragmentBatch, live)), llvm::Align(4));
+}
+
+void FragmentEmitter::add_stage_values(std::vector<llvm::Value**>& places) {
+    places.insert(places.end(), {&batch, &pixel_x, &pixel_y, &center.x, &center.y, &centroid.x, &centroid.y});
+    for (llvm::Value*& primitive : primitives) places.push_back(&primitive);
 }
 
 void FragmentEmitter::emit() {

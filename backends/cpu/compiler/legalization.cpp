@@ -1,13 +1,154 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/cpu/compiler/legalization.h"
 
+#include <algorithm>
 #include <bit>
+#include <limits>
 #include <unordered_map>
 
 #include <fmt/format.h>
 #include <spirv-tools/optimizer.hpp>
+#include <spirv/unified1/spirv.hpp11>
+
+#include "rhi/spirv.h"
 
 namespace nacre::cpu {
+namespace {
+
+using spv::Op;
+
+/// Instructions up to which a module may grow as all calls are replaced by what they call. Beyond, functions that are called
+/// more than once become functions of the code that is made, the large ones first.
+constexpr std::uint64_t most_inlined_instructions = 30'000;
+/// Functions that are kept are at least so large; a call costs about as much as a smaller one.
+constexpr std::uint64_t kept_sizes[] = {4'000, 1'000, 250, 60};
+/// Blocks up to which SPIRV-Tools makes values of variables: it takes time by the square of their number. LLVM does it for others.
+constexpr std::uint64_t most_rewritten_blocks = 3'000;
+/// Where even that does not help (functions with barriers are always inlined).
+constexpr std::uint64_t most_instructions = 2'000'000;
+
+/// Which functions stay functions: those with FunctionControl::DontInline, by which `InlineExhaustivePass` and `Module` go.
+class InliningPlan {
+  public:
+    explicit InliningPlan(std::span<const std::uint32_t> words) {
+        std::unordered_map<std::uint32_t, spv::StorageClass> pointers;
+        std::unordered_map<std::uint32_t, std::uint32_t> pointees;
+        std::unordered_map<std::uint32_t, Op> types;
+        std::vector<std::uint32_t> entries;
+        FunctionSize* function = nullptr;
+        for (const rhi::spirv::Instruction& at : rhi::spirv::instructions(words)) {
+            const Op op = static_cast<Op>(at.opcode());
+            if (function) ++function->own, ++own_instructions_;
+            if (op == Op::OpLabel) ++own_blocks_;
+            switch (op) {
+                case Op::OpEntryPoint: entries.push_back(at.operand(1)); break;
+                case Op::OpTypeArray: case Op::OpTypeRuntimeArray: case Op::OpTypeRayQueryKHR: case Op::OpTypeImage: case Op::OpTypeSampler:
+                case Op::OpTypeSampledImage: case Op::OpTypeAccelerationStructureKHR:
+                    types[at.operand(0)] = op;
+                    break;
+                case Op::OpTypePointer:
+                    pointers[at.operand(0)] = static_cast<spv::StorageClass>(at.operand(1));
+                    pointees[at.operand(0)] = at.operand(2);
+                    break;
+                case Op::OpFunction:
+                    function = &functions_[at.operand(1)];
+                    function->control = at.offset + 3;
+                    order_.push_back(at.operand(1));
+                    break;
+                case Op::OpFunctionParameter: {
+                    // Places of resources in an array, and ray queries, are known only where the call is.
+                    const auto pointee = pointees.find(at.operand(0));
+                    const auto type = types.find(pointee == pointees.end() ? at.operand(0) : pointee->second);
+                    if (type == types.end()) break;
+                    const bool is_array = type->second == Op::OpTypeArray || type->second == Op::OpTypeRuntimeArray;
+                    const bool is_value = pointee != pointees.end() && pointers[at.operand(0)] != spv::StorageClass::UniformConstant;
+                    if (type->second == Op::OpTypeRayQueryKHR || (is_array && !is_value && pointee != pointees.end()))
+                        function->must_inline = true;
+                    break;
+                }
+                case Op::OpFunctionCall: function->callees.push_back(at.operand(2)); break;
+                // All invocations wait in the kernel; lanes that end must end in the caller too.
+                case Op::OpControlBarrier: case Op::OpKill: case Op::OpTerminateInvocation:
+                    if (function) function->must_inline = true;
+                    break;
+                case Op::OpFunctionEnd: function = nullptr; break;
+                default: break;
+            }
+        }
+        for (const std::uint32_t id : order_) require_inlining(functions_[id]);
+        for (const std::uint32_t id : entries) functions_[id].is_entry = true;
+        for (const std::uint32_t id : order_)
+            for (const std::uint32_t callee : functions_[id].callees) ++functions_[callee].calls;
+        instructions_ = total(std::numeric_limits<std::uint64_t>::max());
+        for (const std::uint64_t size : kept_sizes) {
+            if (instructions_ <= most_inlined_instructions) break;
+            instructions_ = total(size);
+        }
+    }
+
+    /// What is left to compile.
+    [[nodiscard]] std::uint64_t instructions() const { return instructions_; }
+
+    /// Basic blocks in it, about.
+    [[nodiscard]] std::uint64_t blocks() const { return own_blocks_ * instructions_ / std::max<std::uint64_t>(own_instructions_, 1); }
+
+    void apply(std::vector<std::uint32_t>& words) const {
+        constexpr auto dont_inline = static_cast<std::uint32_t>(spv::FunctionControlMask::DontInline);
+        for (const auto& [id, function] : functions_) {
+            if (!function.control) continue;
+            if (function.is_kept) words[function.control] |= dont_inline;
+            else words[function.control] &= ~dont_inline;
+        }
+    }
+
+  private:
+    struct FunctionSize {
+        std::size_t control = 0;  ///< Word of its FunctionControl.
+        std::uint64_t own = 0;    ///< Instructions.
+        std::uint64_t inlined = 0;
+        std::uint32_t calls = 0;  ///< Places from which it is called.
+        std::vector<std::uint32_t> callees;
+        bool is_entry = false, must_inline = false, is_kept = false, is_known = false;
+    };
+
+    /// Whoever calls a function that must be inlined must be inlined as well. Call graphs have no cycles.
+    void require_inlining(FunctionSize& function) {
+        if (function.is_known) return;
+        function.is_known = true;
+        for (const std::uint32_t callee : function.callees) {
+            require_inlining(functions_[callee]);
+            function.must_inline = function.must_inline || functions_[callee].must_inline;
+        }
+    }
+    std::uint64_t inlined_size(FunctionSize& function, std::uint64_t kept_size) {
+        constexpr std::uint64_t limit = std::uint64_t{1} << 40;
+        if (function.inlined) return function.inlined;
+        std::uint64_t size = function.own;
+        for (const std::uint32_t callee : function.callees) {
+            FunctionSize& called = functions_[callee];
+            const std::uint64_t its_size = inlined_size(called, kept_size);
+            size = std::min(limit, size + (called.is_kept ? 1 : its_size));
+        }
+        function.is_kept = !function.is_entry && !function.must_inline && function.calls > 1 && size >= kept_size;
+        return function.inlined = std::max<std::uint64_t>(size, 1);
+    }
+    std::uint64_t total(std::uint64_t kept_size) {
+        for (auto& [id, function] : functions_) function.inlined = 0;
+        std::uint64_t sum = 0;
+        for (const std::uint32_t id : order_) {
+            const std::uint64_t size = inlined_size(functions_[id], kept_size);
+            if (functions_[id].is_kept) sum += size;
+            if (functions_[id].is_entry) largest_entry_ = std::max(largest_entry_, size);
+        }
+        return sum + std::exchange(largest_entry_, 0);
+    }
+
+    std::unordered_map<std::uint32_t, FunctionSize> functions_;
+    std::vector<std::uint32_t> order_;
+    std::uint64_t instructions_ = 0, largest_entry_ = 0, own_instructions_ = 0, own_blocks_ = 0;
+};
+
+}  // namespace
 
 Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> words,
                                               std::span<const rhi::SpecializationConstant> specialization, std::string_view name) {
@@ -42,24 +183,31 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
         optimizer.RegisterPass(spvtools::CreateFreezeSpecConstantValuePass())
             .RegisterPass(spvtools::CreateFoldSpecConstantOpAndCompositePass());
     }
+    const InliningPlan plan(words);
+    if (plan.instructions() > most_instructions)
+        return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", name),
+                    fmt::format("with its calls replaced by what they call the shader has {} instructions", plan.instructions()),
+                    "Call functions with barriers less often, or use another backend.");
+    std::vector<std::uint32_t> planned(words.begin(), words.end());
+    plan.apply(planned);
     optimizer.RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
-        .RegisterPass(spvtools::CreatePrivateToLocalPass())
         .RegisterPass(spvtools::CreateInlineExhaustivePass())
         .RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
+        .RegisterPass(spvtools::CreatePrivateToLocalPass())
         .RegisterPass(spvtools::CreateScalarReplacementPass(100))
         .RegisterPass(spvtools::CreateLocalAccessChainConvertPass())
         // Access chains that nothing uses any more would keep variables from becoming values.
         .RegisterPass(spvtools::CreateAggressiveDCEPass(true))
         .RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass())
-        .RegisterPass(spvtools::CreateLocalSingleStoreElimPass())
-        .RegisterPass(spvtools::CreateSSARewritePass())
-        .RegisterPass(spvtools::CreateAggressiveDCEPass(true));
+        .RegisterPass(spvtools::CreateLocalSingleStoreElimPass());
+    if (plan.blocks() <= most_rewritten_blocks) optimizer.RegisterPass(spvtools::CreateSSARewritePass());
+    optimizer.RegisterPass(spvtools::CreateAggressiveDCEPass(true));
     spvtools::OptimizerOptions options;
     options.set_run_validator(false);
     std::vector<std::uint32_t> result;
-    if (!optimizer.Run(words.data(), words.size(), &result, options)) {
+    if (!optimizer.Run(planned.data(), planned.size(), &result, options)) {
         // Simpler is better, not needed; only specialization constants must be frozen.
-        if (!has_specialization) return std::vector<std::uint32_t>(words.begin(), words.end());
+        if (!has_specialization) return planned;
         return fail(ErrorCode::shader_compile, "compile shader", fmt::format("'{}'", name), "the module cannot be specialized: " + log,
                     "Check the types of the specialization constants.");
     }

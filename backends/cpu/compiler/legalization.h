@@ -11,7 +11,8 @@
 namespace nacre::cpu {
 
 /// Makes a valid module simpler without changing what it does: specialization constants get their values, variables that need
-/// no memory become values, dead code goes. Thread-safe.
+/// no memory become values, dead code goes, calls are replaced by what they call as long as the module does not grow too large
+/// (functions that stay have FunctionControl::DontInline). Errors: unsupported where nothing helps against its size. Thread-safe.
 Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> words,
                                               std::span<const rhi::SpecializationConstant> specialization, std::string_view name);
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -154,7 +155,10 @@ void Module::finish_type(Type& type) {
             type.components = static_cast<std::uint32_t>(std::min<std::uint64_t>(total, ~0u));
             break;
         }
-        case TypeKind::pointer: type.components = 0; break;
+        case TypeKind::pointer:
+            if (type.storage == spv::StorageClass::StorageBuffer || type.storage == spv::StorageClass::Workgroup)
+                type.components = 3, type.has_wide = true;
+            break;
         default: break;
     }
 }
@@ -165,6 +169,11 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
         return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", name), std::move(reason), std::move(remedy));
     };
     Module module;
+    for (const Id id : {pointer_word_type, pointer_offset_type}) {
+        Type& word = module.types_[id];
+        word.id = id, word.kind = TypeKind::integer, word.bits = id == pointer_word_type ? 64 : 32;
+        module.finish_type(word);
+    }
     module.words_ = words;
     module.name = std::string(name);
     module.model = model;
@@ -284,6 +293,7 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
                 type.kind = TypeKind::pointer;
                 type.storage = static_cast<spv::StorageClass>(instruction.operand(0));
                 type.element = instruction.operand(1);
+                type.array_stride = decorations[type.id].array_stride;
                 break;
             case Op::OpTypeImage:
                 type.kind = TypeKind::image;
@@ -342,6 +352,7 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
                 blocks.clear();
                 function.id = instruction.result;
                 function.return_type = instruction.type;
+                function.is_kept = (instruction.operand(0) & static_cast<std::uint32_t>(spv::FunctionControlMask::DontInline)) != 0;
                 in_function = true;
                 continue;
             case Op::OpFunctionParameter: function.parameters.push_back(instruction); continue;
@@ -394,7 +405,52 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
         if (const auto value = module.constant_word(workgroup_size_ids[i])) module.workgroup_size[i] = *value;
     for (const auto& [id, from] : decorations)
         if (from.no_contraction) module.no_contraction_.emplace(id, 1);
+    module.find_constant_contents();
     return module;
+}
+
+void Module::find_constant_contents() {
+    constexpr std::uint32_t small_components = 16;  // Up to which registers do as well.
+    std::unordered_map<Id, Id> roots;               // Variables that may be constant, and pointers into them.
+    for (const auto& [id, at] : variables_) {
+        if (at.storage != spv::StorageClass::Function && at.storage != spv::StorageClass::Private) continue;
+        if (type(at.type).components <= small_components) continue;
+        roots[id] = id;
+        if (constant(at.initializer)) constant_contents_[id] = at.initializer;
+    }
+    if (roots.empty()) return;
+    const auto root_of = [&](Id id) {
+        const auto found = roots.find(id);
+        return found == roots.end() ? 0 : found->second;
+    };
+    std::unordered_map<Id, char> changing;
+    for (const auto& [function_id, function] : functions_)
+        for (const Block& block : function.blocks) {
+            for (const Instruction& at : block.body) {
+                if (at.op == Op::OpVariable || at.op == Op::OpLoad) continue;
+                if (at.op == Op::OpAccessChain || at.op == Op::OpInBoundsAccessChain) {
+                    if (const Id root = root_of(at.operand(0))) roots[at.result] = root;
+                    continue;
+                }
+                if (at.op == Op::OpStore) {
+                    const Id root = root_of(at.operand(0)), value = at.operand(1);
+                    const Instruction* stored = constant(value);
+                    if (root && root == at.operand(0) && stored && stored->op != Op::OpUndef) {
+                        const Id before = std::exchange(constant_contents_[root], value);
+                        if (before && before != value) changing[root] = 1;
+                        continue;
+                    }
+                }
+                for (const Id operand : at.operands)
+                    if (const Id root = root_of(operand)) changing[root] = 1;
+            }
+            for (const Instruction& phi : block.phis)
+                for (const Id operand : phi.operands)
+                    if (const Id root = root_of(operand)) changing[root] = 1;
+            for (const Id operand : block.terminator.operands)
+                if (const Id root = root_of(operand)) changing[root] = 1;
+        }
+    for (const auto& [id, is_changing] : changing) constant_contents_.erase(id);
 }
 
 void Module::order_blocks(Function& function, std::vector<Block> blocks) {

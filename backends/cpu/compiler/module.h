@@ -22,6 +22,9 @@ namespace nacre::cpu {
 
 using Id = std::uint32_t;
 
+/// Types of the components of pointers, which no module declares.
+inline constexpr Id pointer_word_type = ~0u - 1, pointer_offset_type = ~0u - 2;
+
 enum class TypeKind : std::uint8_t {
     void_type, boolean, integer, floating, vector, matrix, array, runtime_array, structure, pointer, image, sampler,
     sampled_image, function, acceleration_structure, ray_query,
@@ -47,7 +50,7 @@ struct Type {
     bool is_signed = false;
     Id element = 0;                 ///< vector: scalar; matrix: column; array; pointer: pointee; sampled_image: image; image: sampled type
     std::uint32_t count = 0;        ///< vector, matrix, array
-    std::uint32_t array_stride = 0; ///< Bytes; 0 where the array has no explicit layout.
+    std::uint32_t array_stride = 0; ///< Bytes, of arrays and pointers; 0 where there is no explicit layout.
     spv::StorageClass storage = spv::StorageClass::Function;  ///< pointer
     std::vector<Member> members;
     bool is_block = false;          ///< Decorated Block or BufferBlock.
@@ -56,7 +59,8 @@ struct Type {
     spv::Dim dim = spv::Dim::Dim2D;
     bool arrayed = false, multisampled = false;
     std::uint32_t sampled = 0;      ///< 1: with a sampler, 2: storage
-    /// Scalars in a value of this type; 0 for types without values (and for runtime arrays, samplers, images).
+    /// Scalars in a value of this type; 0 for types without values (and for runtime arrays, samplers, images). Pointers into
+    /// buffers and workgroup memory have three: address of the range, its bytes, offset in it.
     std::uint32_t components = 0;
     bool has_wide = false;          ///< Some scalar has 64 bits.
     [[nodiscard]] bool is_scalar() const {
@@ -91,6 +95,7 @@ struct Block {
 struct Function {
     Id id = 0;
     Id return_type = 0;
+    bool is_kept = false;  ///< Becomes a function of the code that is made; others are emitted where they are called.
     std::vector<Instruction> parameters;
     /// In structured order: a block after all from which it is reached but over a back edge; the blocks of a construct
     /// together, merge blocks behind them, continue constructs behind loop bodies. Unreachable blocks are left out.
@@ -139,6 +144,11 @@ class Module {
     [[nodiscard]] const Function& entry() const { return functions_.at(entry_); }
     [[nodiscard]] const std::vector<Id>& interface() const { return interface_; }
     [[nodiscard]] bool is_glsl_set(Id id) const { return id == glsl_set_; }
+    /// The constant that a Function or Private variable holds all the time; 0 where it changes, or is small.
+    [[nodiscard]] Id constant_content(Id variable) const {
+        const auto found = constant_contents_.find(variable);
+        return found == constant_contents_.end() ? 0 : found->second;
+    }
     /// Result type of any id that has one; 0 otherwise.
     [[nodiscard]] Id type_of(Id id) const {
         const auto found = result_types_.find(id);
@@ -168,12 +178,14 @@ class Module {
     std::unordered_map<Id, Function> functions_;
     std::unordered_map<Id, Id> result_types_;
     std::unordered_map<Id, char> no_contraction_;
+    std::unordered_map<Id, Id> constant_contents_;
     std::vector<Id> interface_;
     Id entry_ = 0;
     Id glsl_set_ = ~0u;
 
     void finish_type(Type& type);
     void order_blocks(Function& function, std::vector<Block> blocks);
+    void find_constant_contents();
 };
 
 }  // namespace nacre::cpu

@@ -9,9 +9,14 @@ std::uint32_t append(const Module& module, Id type_id, std::uint32_t location, s
                      std::vector<InterfaceScalar>& list) {
     const Type& type = module.type(type_id);
     switch (type.kind) {
-        case TypeKind::vector:
-            for (std::uint32_t i = 0; i < type.count; ++i) append(module, type.element, location, component + i, how, list);
-            return location + 1;
+        case TypeKind::vector: {
+            // Vectors of more than two 64-bit values go on in the next location.
+            const std::uint32_t words = module.type(type.element).bits == 64 ? 2 : 1;
+            std::uint32_t word = component;
+            for (std::uint32_t i = 0; i < type.count; ++i, word += words)
+                append(module, type.element, location + word / 4, word % 4, how, list);
+            return location + (word + 3) / 4;
+        }
         case TypeKind::matrix:
         case TypeKind::array:
             for (std::uint32_t i = 0; i < type.count; ++i) location = append(module, type.element, location, component, how, list);
@@ -27,6 +32,8 @@ std::uint32_t append(const Module& module, Id type_id, std::uint32_t location, s
         default: {
             InterfaceScalar scalar = how;
             scalar.location = location, scalar.component = component, scalar.type = type_id;
+            scalar.is_wide = type.bits == 64;
+            scalar.upper_location = location + (component + 1) / 4, scalar.upper_component = (component + 1) % 4;
             list.push_back(scalar);
             return location + 1;
         }
@@ -37,7 +44,6 @@ std::uint32_t append(const Module& module, Id type_id, std::uint32_t location, s
 
 std::optional<std::vector<InterfaceScalar>> interface_scalars(const Module& module, const Variable& variable) {
     const Type& type = module.type(variable.type);
-    if (type.has_wide) return std::nullopt;
     const bool has_location =
         variable.location || (type.kind == TypeKind::structure && !type.members.empty() && type.members[0].location);
     if (!has_location) return std::nullopt;

@@ -14,11 +14,13 @@ namespace nacre::cpu {
 
 struct InterfaceScalar {
     std::uint32_t location = 0, component = 0;
+    bool is_wide = false;                                   ///< 64 bits: two words,
+    std::uint32_t upper_location = 0, upper_component = 0;  ///< the upper one here.
     bool flat = false, no_perspective = false, centroid = false, sample = false;
     Id type = 0;  ///< Scalar type.
 };
 
-/// One entry for each scalar of the variable, in order. Nothing where it holds 64-bit values or has no locations.
+/// One entry for each scalar of the variable, in order. Nothing where it has no locations.
 std::optional<std::vector<InterfaceScalar>> interface_scalars(const Module& module, const Variable& variable);
 
 /// Whether code names member `member` of a block of built-in variables; blocks that are used as a whole use every member.

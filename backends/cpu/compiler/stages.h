@@ -24,6 +24,10 @@ class ComputeEmitter final : public Emitter {
     bool emit_stage(const Instruction& at) override;
     std::vector<Component> input_components(const Variable& variable) override;
     llvm::Value* workgroup_memory() override { return memory; }
+    void add_stage_values(std::vector<llvm::Value**>& places) override;
+    llvm::Value* large_memory(std::uint64_t bytes) override;
+    [[nodiscard]] bool is_on_heap() const override { return function_->isPresplitCoroutine(); }
+    [[nodiscard]] bool waits_for_workgroup(const Instruction& barrier) const;
     void emit_subgroup_body(llvm::Value* subgroup);
     void emit_plain_kernel();
     void emit_suspending_kernel();
@@ -46,6 +50,7 @@ class VertexEmitter final : public Emitter {
     Component fetch(const rhi::VertexAttribute& attribute, std::uint32_t component, const Type& scalar);
     void emit_batch();
     void store_outputs();
+    void add_stage_values(std::vector<llvm::Value**>& places) override;
     const VertexInput& input_;
     llvm::Value *draw = nullptr, *batch = nullptr, *indices = nullptr, *instance = nullptr;
 };
@@ -75,6 +80,7 @@ class FragmentEmitter final : public Emitter {
     void emit_batch();
     void store_outputs();
     void declare_inputs();
+    void add_stage_values(std::vector<llvm::Value**>& places) override;
     llvm::Value* batch = nullptr;
     std::array<llvm::Value*, max_quads> primitives{};
     bool is_one_primitive = false;  ///< While code is emitted for batches whose quads all have the first one's primitive.

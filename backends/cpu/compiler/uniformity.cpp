@@ -165,7 +165,7 @@ void Uniformity::visit(const Instruction& at, Id block) {
         case Op::OpStore:
         case Op::OpCopyMemory: {
             const Id root = root_of(at.operand(0));
-            if (!root) return;
+            if (!root || module_.constant_content(root)) return;
             bool divergent = is_divergent(at.operand(0)) || is_partial(block);
             if (at.op == Op::OpStore) {
                 divergent = divergent || is_divergent(at.operand(1));
@@ -181,7 +181,7 @@ void Uniformity::visit(const Instruction& at, Id block) {
             for (std::size_t i = 0; i < callee.parameters.size(); ++i) {
                 const Id argument = at.operand(i + 1), parameter = callee.parameters[i].result;
                 const Type& type = module_.type(callee.parameters[i].type);
-                if (type.kind == TypeKind::pointer) {
+                if (type.kind == TypeKind::pointer && (type.storage == StorageClass::Function || type.storage == StorageClass::Private)) {
                     // Who writes through the parameter is not followed back to the variable: it counts as divergent.
                     mark(divergent_, parameter);
                     if (const Id root = root_of(argument)) mark(content_, root);
@@ -223,7 +223,7 @@ void Uniformity::visit(const Instruction& at, Id block) {
         case Op::OpRayQueryGetWorldRayDirectionKHR: case Op::OpRayQueryGetWorldRayOriginKHR:
         case Op::OpRayQueryGetIntersectionObjectToWorldKHR: case Op::OpRayQueryGetIntersectionWorldToObjectKHR:
         case Op::OpGroupNonUniformShuffleDown: case Op::OpGroupNonUniformQuadBroadcast:
-        case Op::OpGroupNonUniformQuadSwap: case Op::OpIsHelperInvocationEXT:
+        case Op::OpGroupNonUniformQuadSwap: case Op::OpGroupNonUniformRotateKHR: case Op::OpIsHelperInvocationEXT:
             return mark(divergent_, at.result);
         // Equal in all lanes whatever goes in, if the whole subgroup takes part in the reduction.
         case Op::OpGroupNonUniformBroadcastFirst: case Op::OpGroupNonUniformBallot: case Op::OpGroupNonUniformAll:

@@ -124,9 +124,10 @@ std::vector<Component> VertexEmitter::input_components(const Variable& variable)
         }
     }
     const auto scalars = interface_scalars(module, variable);
-    if (!scalars) reject(fmt::format("input '{}' has no location, or holds 64-bit values", variable.name));
+    if (!scalars) reject(fmt::format("input '{}' has no location", variable.name));
     std::vector<Component> made;
     for (const InterfaceScalar& at : *scalars) {
+        if (at.is_wide) reject(fmt::format("input '{}' holds 64-bit values, of which no vertex format is made", variable.name));
         const auto attribute = std::ranges::find(input_.attributes, at.location, &rhi::VertexAttribute::location);
         if (attribute == input_.attributes.end()) made.push_back(zero(module.type(at.type)));
         else made.push_back(fetch(*attribute, at.component, module.type(at.type)));
@@ -163,11 +164,19 @@ void VertexEmitter::store_outputs() {
             }
         } else {
             const auto scalars = interface_scalars(module, *variable);
-            if (!scalars) reject(fmt::format("output '{}' has no location, or holds 64-bit values", variable->name));
+            if (!scalars) reject(fmt::format("output '{}' has no location", variable->name));
             const std::vector<Component> values = load(pointer);
             for (std::size_t i = 0; i < scalars->size(); ++i) {
-                program.outputs.push_back({(*scalars)[i].location, (*scalars)[i].component, program.output_slots});
-                put(program.output_slots++, values[i]);
+                const InterfaceScalar& at = (*scalars)[i];
+                program.outputs.push_back({at.location, at.component, program.output_slots});
+                if (!at.is_wide) {
+                    put(program.output_slots++, values[i]);
+                    continue;
+                }
+                llvm::Value* bits = builder.CreateBitCast(widen(values[i]), vector_of(builder.getInt64Ty()));
+                put(program.output_slots++, Component(bits));
+                program.outputs.push_back({at.upper_location, at.upper_component, program.output_slots});
+                put(program.output_slots++, Component(builder.CreateLShr(bits, 32)));
             }
         }
     }
@@ -197,6 +206,10 @@ void VertexEmitter::store_outputs() {
     if (!has_point_size) put(slot_point_size, Component(llvm::ConstantFP::get(builder.getFloatTy(), 1)));
     program.writes_point_size = has_point_size;
     std::ranges::sort(program.outputs, {}, [](const VertexOutput& at) { return std::pair(at.location, at.component); });
+}
+
+void VertexEmitter::add_stage_values(std::vector<llvm::Value**>& places) {
+    places.insert(places.end(), {&draw, &batch, &indices, &instance});
 }
 
 void VertexEmitter::emit() {
