@@ -86,8 +86,7 @@ double Assembler::bias(double slope, double largest_depth) const {
     const rhi::DepthStencilState& state = pipeline_.depth_stencil;
     if (state.depth_bias == 0.0f && state.depth_bias_slope == 0.0f) return 0.0;
     double unit = fixed_unit(draw_.depth_layout);
-    if (unit == 0.0 && largest_depth > 0.0)
-        unit = std::ldexp(1.0, std::max(std::ilogb(largest_depth), -126) - 23);
+    if (unit == 0.0 && largest_depth > 0.0) unit = std::ldexp(1.0, std::max(std::ilogb(largest_depth), -126) - 23);
     double result = slope * state.depth_bias_slope + unit * state.depth_bias;
     if (state.depth_bias_clamp > 0.0f) result = std::min(result, static_cast<double>(state.depth_bias_clamp));
     if (state.depth_bias_clamp < 0.0f) result = std::max(result, static_cast<double>(state.depth_bias_clamp));
@@ -148,7 +147,8 @@ bool Assembler::homogeneous_source(const SetupVertex (&vertices)[3], std::uint32
 }
 
 /// @param left  of the tiles that it touches; right and so on, inclusive
-void Assembler::bin(std::uint32_t record, std::int32_t left, std::int32_t right, std::int32_t top, std::int32_t bottom) {
+void Assembler::bin(std::uint32_t record, std::int32_t left, std::int32_t right, std::int32_t top,
+                    std::int32_t bottom) {
     const auto across = static_cast<std::int32_t>(targets_.tiles_x);
     if (left == right && top == bottom) {
         scratch_.entries.push_back({static_cast<std::uint32_t>(top * across + left), record});
@@ -190,7 +190,9 @@ void Assembler::add(const Corners& corners, const Source& source, std::uint32_t 
     }
     record.primitive_id = source.primitive_id;
     record.bits = bits | draw_bits_ | static_cast<std::uint32_t>(source.kind) << Record::source_shift;
-    const auto bounded = [](double slope) { return std::abs(slope) < steepest_slope ? static_cast<float>(slope) : 0.0f; };
+    const auto bounded = [](double slope) {
+        return std::abs(slope) < steepest_slope ? static_cast<float>(slope) : 0.0f;
+    };
     record.depth_c = bounded(source.depth.c), record.depth_dx = bounded(source.depth.dx);
     record.depth_dy = bounded(source.depth.dy);
     record.x0 = source.x0, record.y0 = source.y0;

@@ -100,8 +100,8 @@ struct Rasterizer::State {
             return;
         if (draw_count == slab_draws) flush(false);
         std::uint32_t index = enqueue(state, call);
-        const std::uint32_t chunk_primitives = std::clamp(
-            count / (8 * scheduler.thread_count()), least_chunk_primitives, most_chunk_primitives);
+        const std::uint32_t chunk_primitives =
+            std::clamp(count / (8 * scheduler.thread_count()), least_chunk_primitives, most_chunk_primitives);
         const bool whole = pipeline.vertex.has_side_effects && count <= largest_whole_instance;
         for (std::uint32_t instance = 0; instance < call.instance_count; ++instance) {
             for (std::uint32_t first = 0; first < count;) {
@@ -175,8 +175,8 @@ struct Rasterizer::State {
             color_memory[thread].reserve(std::size_t{targets.color_planes} * tile_pixels * sizeof(std::uint32_t), 0);
             workspace(thread).colors = reinterpret_cast<std::uint32_t*>(color_memory[thread].data());
         }
-        const TileJob job{&targets,     views.data(), static_cast<std::uint32_t>(views.size()),
-                          plans.data(), lanes,        &srgb_tables(),
+        const TileJob job{&targets,        views.data(), static_cast<std::uint32_t>(views.size()),
+                          plans.data(),    lanes,        &srgb_tables(),
                           uncleared.data()};
         run(static_cast<std::uint32_t>(busy_tiles.size()), [&](std::uint32_t index, std::uint32_t thread) {
             kernels.draw_tile(job, busy_tiles[index], workspace(thread));

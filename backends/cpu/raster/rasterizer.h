@@ -40,8 +40,8 @@ struct RenderTargets {
     std::vector<ImageView> colors;
     ImageView depth_stencil{};  ///< format undefined: none.
     std::uint32_t width = 0, height = 0, samples = 1;
-    // Bytes of a texel that a target is filled with before the first draw; the fill is finished when the pass ends. Nothing:
-    // it keeps what it holds. `color_clears` may be shorter than `colors`.
+    // Bytes of a texel that a target is filled with before the first draw; the fill is finished when the pass ends.
+    // Nothing: it keeps what it holds. `color_clears` may be shorter than `colors`.
     std::vector<std::optional<std::array<std::byte, 16>>> color_clears;
     std::optional<std::array<std::byte, 4>> depth_clear;
     std::optional<std::uint8_t> stencil_clear;

@@ -104,8 +104,8 @@ NACRE_LANES_INLINE Floats fused(const Floats& a, const Floats& b, const Floats& 
 #elif defined(__FMA__)
     NACRE_EACH result.part[i] = (FloatRegister)_mm256_fmadd_ps((__m256)a.part[i], (__m256)b.part[i], (__m256)c.part[i]);
 #else
-    NACRE_EACH for (int lane = 0; lane < register_lanes; ++lane)
-        result.part[i][lane] = __builtin_fmaf(a.part[i][lane], b.part[i][lane], c.part[i][lane]);
+    NACRE_EACH for (int lane = 0; lane < register_lanes; ++lane) result.part[i][lane] =
+        __builtin_fmaf(a.part[i][lane], b.part[i][lane], c.part[i][lane]);
 #endif
     return result;
 }
@@ -326,7 +326,8 @@ NACRE_LANES_INLINE void store_some4(void* to, Int4 value, std::uint32_t mask) {
     store4(to, value ^ ((value ^ old) & kept));
 #endif
 }
-/// Past the caches, which need not read the rest of the line then; seen by others after `end_streams`. Aligned to 16 bytes.
+/// Past the caches, which need not read the rest of the line then; seen by others after `end_streams`. Aligned to 16
+/// bytes.
 NACRE_LANES_INLINE void stream4(void* to, Int4 value) {
 #if defined(__x86_64__)
     _mm_stream_si128(static_cast<__m128i*>(to), (__m128i)value);

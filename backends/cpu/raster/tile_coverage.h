@@ -9,8 +9,8 @@
 /// Edge functions are exact: E(x, y) = A * (x - x0) + B * (y - y0) in 64 bits with 8 subpixel bits on each side, less
 /// one for edges whose own pixels belong to the neighbor (top-left rule). Samples lie a whole number of pixels apart,
 /// so that the low 8 bits of E, which are the same in all of them, can be cut off (rounding down keeps the sign), and
-/// the rest fits 32 bits wherever the edge crosses the tile. Small triangles, which are at most 32 pixels long both ways,
-/// need no more than 32 bits for all of it.
+/// the rest fits 32 bits wherever the edge crosses the tile. Small triangles, which are at most 32 pixels long both
+/// ways, need no more than 32 bits for all of it.
 
 namespace nacre::cpu::raster {
 namespace {
@@ -34,12 +34,13 @@ NACRE_LANES_INLINE std::uint32_t lanes_inside(std::int32_t block_x, std::int32_t
     return lanes;
 }
 
-/// What sixteen records of a draw are in a tile, if they are triangles: bounds, edges, and whether they are small enough
-/// for 32 bits to hold all of that.
+/// What sixteen records of a draw are in a tile, if they are triangles: bounds, edges, and whether they are small
+/// enough for 32 bits to hold all of that.
 struct SmallTriangles {
-    alignas(64) std::int32_t first_x[16], first_y[16], last_x[16], last_y[16];  ///< Pixels of the tile that may be drawn.
-    /// Edge functions: what they change by from pixel to pixel, and their values in the first pixel of the tile and of the
-    /// block that holds (first_x, first_y).
+    alignas(64) std::int32_t first_x[16], first_y[16], last_x[16],
+        last_y[16];  ///< Pixels of the tile that may be drawn.
+    /// Edge functions: what they change by from pixel to pixel, and their values in the first pixel of the tile and of
+    /// the block that holds (first_x, first_y).
     alignas(64) std::int32_t along_x[3][16], along_y[3][16], at_tile[3][16], at_block[3][16];
     std::uint32_t small;  ///< One bit for each record. What is said of the others does not hold.
     std::uint32_t drawn;  ///< They have pixels that may be drawn.
@@ -51,7 +52,8 @@ struct SmallTriangles {
             for (int row = 0; row < 2; ++row) {
                 Int4 lines[4];
                 for (std::uint32_t i = 0; i < 4; ++i)
-                    lines[i] = load4(reinterpret_cast<const std::byte*>(records[lane + i < count ? lane + i : 0]) + 16 * row);
+                    lines[i] =
+                        load4(reinterpret_cast<const std::byte*>(records[lane + i < count ? lane + i : 0]) + 16 * row);
                 transpose(lines[0], lines[1], lines[2], lines[3]);
                 for (int i = 0; i < 4; ++i) store4(words[4 * row + i] + lane, lines[i]);
             }
@@ -62,10 +64,10 @@ struct SmallTriangles {
             x[i] = load(words[i]) - ints(run.tile_x * subpixels + subpixels / 2);
             y[i] = load(words[3 + i]) - ints(run.tile_y * subpixels + subpixels / 2);
         }
-        const auto bounds = [&](const Ints (&at)[3], std::int32_t begin, std::int32_t turned_last, Ints& low, Ints& high,
+        const auto bounds = [&](const Ints(&at)[3], std::int32_t begin, std::int32_t turned_last, Ints& low, Ints& high,
                                 Lanes& is_small, Lanes& is_whole) {
-            const Ints first = shift_right_signed<subpixel_bits>(minimum(minimum(at[0], at[1]), at[2]) +
-                                                                 ints(subpixels - 1));
+            const Ints first =
+                shift_right_signed<subpixel_bits>(minimum(minimum(at[0], at[1]), at[2]) + ints(subpixels - 1));
             const Ints last = shift_right_signed<subpixel_bits>(maximum(maximum(at[0], at[1]), at[2]));
             is_small = less(last - first, ints(32));
             low = maximum(first, ints(begin)), high = minimum(last, ints(~turned_last));
@@ -84,8 +86,8 @@ struct SmallTriangles {
             const int next = i == 2 ? 0 : i + 1;
             const Ints edge_a = y[i] - y[next], edge_b = x[next] - x[i];
             const Lanes owns_border = less(ints(0), edge_a) | (equal(edge_a, ints(0)) & less(ints(0), edge_b));
-            const Ints value = shift_right_signed<subpixel_bits>(select(owns_border, ints(0), ints(-1)) - edge_a * x[i] -
-                                                                 edge_b * y[i]);
+            const Ints value = shift_right_signed<subpixel_bits>(select(owns_border, ints(0), ints(-1)) -
+                                                                 edge_a * x[i] - edge_b * y[i]);
             store(along_x[i], edge_a), store(along_y[i], edge_b), store(at_tile[i], value);
             store(at_block[i], value + edge_a * block_x + edge_b * block_y);
         }
@@ -212,8 +214,8 @@ struct Coverage {
                 if (mask == 0) continue;
                 const std::uint32_t place = block_place(block_x, block_y);
                 if (tests) {
-                    const Ints key = depth_key(layout, plane_c + plane_dx * (x - from_x) + along_y, run.depth_low,
-                                               run.depth_high);
+                    const Ints key =
+                        depth_key(layout, plane_c + plane_dx * (x - from_x) + along_y, run.depth_low, run.depth_high);
                     std::int32_t* const depth = run.memory.depth[0] + place;
                     const Ints old = load(depth);
                     const Lanes passes = lanes_of(mask) & compare(draw.depth_stencil.compare, key, old);
@@ -284,9 +286,9 @@ struct Coverage {
         run_blocks<3>(left, right, top, bottom);
     }
 
-    /// As run_simple_blocks, for two by two blocks and with a depth test: without loops, and with hardly a branch that the
-    /// processor could guess wrong. Where there is only one row or column, what is done for the other changes nothing;
-    /// the memory of depth goes on behind that of the first sample.
+    /// As run_simple_blocks, for two by two blocks and with a depth test: without loops, and with hardly a branch that
+    /// the processor could guess wrong. Where there is only one row or column, what is done for the other changes
+    /// nothing; the memory of depth goes on behind that of the first sample.
     [[gnu::always_inline]] void run_four_blocks(const SmallTriangles& from, std::uint32_t lane, std::int32_t first_x,
                                                 std::int32_t last_x, std::int32_t first_y, std::int32_t last_y) {
         const Record& record = *run.record;
@@ -346,9 +348,9 @@ struct Coverage {
         run.memory.passed_samples += static_cast<std::uint32_t>(__builtin_popcountll(all));
         if (!draw.shades) return;
         const std::uint32_t columns = 1u << first_x / region_blocks | 1u << last_x / region_blocks;
-        run.append_four_blocks(place, masks,
-                               columns << first_y / region_blocks * regions_across |
-                                   columns << last_y / region_blocks * regions_across);
+        run.append_four_blocks(
+            place, masks,
+            columns << first_y / region_blocks * regions_across | columns << last_y / region_blocks * regions_across);
     }
 
     void draw_triangle() {

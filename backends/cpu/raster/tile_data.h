@@ -19,7 +19,7 @@ namespace nacre::cpu::raster {
 
 inline constexpr int tile_bits = 6;
 inline constexpr std::int32_t tile_size = 1 << tile_bits;  ///< Pixels, both ways.
-inline constexpr std::int32_t tile_blocks = 16;  ///< Blocks of 4x4 pixels in a row of a tile.
+inline constexpr std::int32_t tile_blocks = 16;            ///< Blocks of 4x4 pixels in a row of a tile.
 inline constexpr std::int32_t tile_pixels = tile_size * tile_size;
 inline constexpr std::int32_t subpixel_bits = 8;
 inline constexpr std::int32_t subpixels = 1 << subpixel_bits;
@@ -194,9 +194,9 @@ struct Stream {
     std::uint32_t quads;
 };
 
-/// Memory of one thread. The pixels of a tile lie here in blocks of 4x4 that consist of four quads: pixel (x, y) of quad
-/// (i, j) is lane 4 * (2 * j + i) + 2 * y + x. Depth and stencil are 32-bit integers that compare like the depths. Colors
-/// are the words of the texels: those of a block together, TargetSet::color_planes times 16 lanes.
+/// Memory of one thread. The pixels of a tile lie here in blocks of 4x4 that consist of four quads: pixel (x, y) of
+/// quad (i, j) is lane 4 * (2 * j + i) + 2 * y + x. Depth and stencil are 32-bit integers that compare like the depths.
+/// Colors are the words of the texels: those of a block together, TargetSet::color_planes times 16 lanes.
 struct alignas(64) Workspace {
     std::int32_t depth[most_samples][tile_pixels];
     std::int32_t stencil[most_samples][tile_pixels];

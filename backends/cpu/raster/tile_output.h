@@ -83,8 +83,7 @@ inline void pack_colors(const ColorPlan& plan, const ColorTarget& target, const 
 
 /// Colors of `plan` over `old`, what the target holds: blended, masked.
 inline void blend_colors(const DrawPlan& draw, const ColorPlan& plan, const ColorTarget& target, const SrgbTables& srgb,
-                         const FragmentBatch& batch, const std::uint32_t (&old)[4][16],
-                         std::uint32_t (&words)[4][16]) {
+                         const FragmentBatch& batch, const std::uint32_t (&old)[4][16], std::uint32_t (&words)[4][16]) {
     Ints old_words[4], channels[4], packed[4];
     for (std::uint32_t i = 0; i < 4; ++i) old_words[i] = load(old[i]);
     load_channels(batch, plan.output, plan.components, channels);

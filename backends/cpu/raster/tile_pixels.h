@@ -19,8 +19,8 @@ NACRE_LANES_INLINE std::uint32_t block_place(std::int32_t x, std::int32_t y) {
     return static_cast<std::uint32_t>(y * tile_blocks + x) * 16;
 }
 
-/// Four texels of a row, `bytes` each, as one vector for each 32-bit word of a texel (one for texels below 32 bits), and
-/// back.
+/// Four texels of a row, `bytes` each, as one vector for each 32-bit word of a texel (one for texels below 32 bits),
+/// and back.
 template <int bytes>
 NACRE_LANES_INLINE void load_row(const std::byte* from, Int4* words) {
     if constexpr (bytes == 1) {
@@ -199,7 +199,8 @@ inline void store_pixels(std::uint32_t bytes, std::byte* to, std::uint32_t row_s
 }
 
 /// Depth as the integer that the target holds; integers compare like the depths. Floats that are not negative compare
-/// like their bits. `low` and `high` are the range of depth clamp, or 0 and 1; `low` is not negative, nor negative zero.
+/// like their bits. `low` and `high` are the range of depth clamp, or 0 and 1; `low` is not negative, nor negative
+/// zero.
 NACRE_LANES_INLINE Ints depth_key(DepthLayout layout, const Floats& depth, float low, float high) {
     const Floats bounded = clamp(depth, low, high);
     switch (layout) {

@@ -47,10 +47,12 @@ struct TileRun {
     std::int32_t* stencil = nullptr;
     float depth_low = 0.0f, depth_high = 1.0f;
     std::int32_t farthest_key = 0;  ///< Of the depths from 0 to 1.
-    bool simple_depth = false;                        ///< See Coverage::run_simple_blocks.
-    alignas(16) std::int32_t limits[4] = {};  ///< Pixels that may be drawn: first x and y, last x and y with all bits turned.
+    bool simple_depth = false;      ///< See Coverage::run_simple_blocks.
+    alignas(16)
+        std::int32_t limits[4] = {};  ///< Pixels that may be drawn: first x and y, last x and y with all bits turned.
 
-    // What write_plain writes: words of 16 lanes in FragmentBatch::colors, or of packed texels, and where in a block they go.
+    // What write_plain writes: words of 16 lanes in FragmentBatch::colors, or of packed texels, and where in a block
+    // they go.
     struct PlainWord {
         std::uint32_t from, to;
     };
@@ -62,12 +64,13 @@ struct TileRun {
     const std::byte* vertex_memory = nullptr;
     const PrimitiveData* primitive = nullptr;
     std::uint32_t next_slot = 0;
-    // One bit for each region: colors that are in the tile's memory, those of all targets that the draw writes, and of each.
+    // One bit for each region: colors that are in the tile's memory, those of all targets that the draw writes, and of
+    // each.
     std::uint32_t entered_regions = 0, loaded_regions[8] = {};
     bool front = true;
 
-    // Hierarchical depth: for each region a depth that no other is above, or below. Draws that keep the nearer (farther)
-    // depth can leave it as it is; it becomes exact again when the region is measured.
+    // Hierarchical depth: for each region a depth that no other is above, or below. Draws that keep the nearer
+    // (farther) depth can leave it as it is; it becomes exact again when the region is measured.
     enum class Bound { none, above, below };
     Bound bound = Bound::none;
     bool depth_is_clear = false;  ///< All depths are TargetSet::clear_depth.
@@ -106,8 +109,7 @@ struct TileRun {
     }
     [[nodiscard]] std::byte* texels_of(const ColorTarget& target, std::uint32_t sample, std::int32_t x,
                                        std::int32_t y) const {
-        return target.data + sample * target.sample_stride +
-               static_cast<std::size_t>(tile_y + y) * target.row_stride +
+        return target.data + sample * target.sample_stride + static_cast<std::size_t>(tile_y + y) * target.row_stride +
                static_cast<std::size_t>(tile_x + x) * target.texel_bytes;
     }
     /// Where the words of a pixel begin; those of target's sample lie `color_offset` behind, 16 from one to the next.
@@ -203,8 +205,8 @@ struct TileRun {
                 fill_texels(&targets.clear_depth, depth_bytes(), depth_texels(sample), targets.depth_row_stride, width,
                             height);
             if (stencil_changed || (stencil_clears && stencil_loaded))
-                store_pixels(1, stencil_texels(sample), targets.stencil_row_stride,
-                             plane_area(memory.stencil, sample), false);
+                store_pixels(1, stencil_texels(sample), targets.stencil_row_stride, plane_area(memory.stencil, sample),
+                             false);
             else if (stencil_clears)
                 fill_texels(&targets.clear_stencil, 1, stencil_texels(sample), targets.stencil_row_stride, width,
                             height);
@@ -393,8 +395,7 @@ struct TileRun {
         Stream& stream = memory.streams[0];
         const PrimitiveData* const from = &current_primitive();
         repeat_pointer<16>(stream.primitives + stream.quads, from);
-        for (std::uint32_t block = 0; block < 4; ++block)
-            append_quads(stream, place + four_blocks[block], live[block]);
+        for (std::uint32_t block = 0; block < 4; ++block) append_quads(stream, place + four_blocks[block], live[block]);
         if (stream.quads >= stream_quads) flush_stream(0, stream_quads);
     }
     template <int count>
@@ -513,9 +514,8 @@ struct TileRun {
         for (std::uint32_t quad = 0; quad < quads; ++quad) {
             // Quads of unfilled batches repeat others, without a live pixel.
             const std::uint32_t pixels = live >> (4 * quad) & 15;
-            each(places[quad], 4 * quad, [&](std::uint32_t* to, const std::uint32_t* from) {
-                store_some4(to, load4(from), pixels);
-            });
+            each(places[quad], 4 * quad,
+                 [&](std::uint32_t* to, const std::uint32_t* from) { store_some4(to, load4(from), pixels); });
         }
     }
     /// Lists the words that write_plain writes.

@@ -7,8 +7,8 @@
 /// @file
 /// Set-up of sixteen triangles at once. Internal linkage, as in simd.h.
 ///
-/// What is computed for one triangle is what Assembler (chunk.cpp) computes for it, bit for bit: the same steps in the same
-/// precision.
+/// What is computed for one triangle is what Assembler (chunk.cpp) computes for it, bit for bit: the same steps in the
+/// same precision.
 
 namespace nacre::cpu::raster {
 namespace {
@@ -92,8 +92,7 @@ inline void set_up_triangles(TriangleSetup& work) {
     };
     const Ints any = load(a.codes) | load(b.codes) | load(c.codes);
     const Ints all = load(a.codes) & load(b.codes) & load(c.codes);
-    const Lanes outside =
-        has(any, not_finite) | has(all, outside_view | clip_distances_mask | cull_distances_mask);
+    const Lanes outside = has(any, not_finite) | has(all, outside_view | clip_distances_mask | cull_distances_mask);
     const Lanes clipped = has(any, outside_near | outside_far | outside_guard | clip_distances_mask);
 
     // Pixels with a center inside of the bounds.
@@ -114,9 +113,8 @@ inline void set_up_triangles(TriangleSetup& work) {
     for (int half = 0; half < 16; half += 8) {
         // Differences of coordinates have 24 bits, so that doubles hold the products.
         const Doubles fixed_x = doubles_of(a.x + half), fixed_y = doubles_of(a.y + half);
-        const Doubles fixed_area =
-            (doubles_of(b.x + half) - fixed_x) * (doubles_of(c.y + half) - fixed_y) -
-            (doubles_of(c.x + half) - fixed_x) * (doubles_of(b.y + half) - fixed_y);
+        const Doubles fixed_area = (doubles_of(b.x + half) - fixed_x) * (doubles_of(c.y + half) - fixed_y) -
+                                   (doubles_of(c.x + half) - fixed_x) * (doubles_of(b.y + half) - fixed_y);
         const Doubles x0 = doubles_of(a.window_x + half), y0 = doubles_of(a.window_y + half);
         const Doubles z0 = doubles_of(a.window_z + half);
         const Doubles x1 = doubles_of(b.window_x + half) - x0, y1 = doubles_of(b.window_y + half) - y0;
@@ -131,8 +129,8 @@ inline void set_up_triangles(TriangleSetup& work) {
         const Doubles dx = z1 * (y2 * scale) + z2 * (-y1 * scale), dy = z1 * (-x2 * scale) + z2 * (x1 * scale);
         Doubles base = z0;
         if (work.bias != 0.0f || work.bias_slope != 0.0f) {
-            const Doubles largest = larger(
-                larger(magnitude(z0), magnitude(doubles_of(b.window_z + half))), magnitude(doubles_of(c.window_z + half)));
+            const Doubles largest = larger(larger(magnitude(z0), magnitude(doubles_of(b.window_z + half))),
+                                           magnitude(doubles_of(c.window_z + half)));
             base = base + depth_bias(work, larger(magnitude(dx), magnitude(dy)), largest);
         }
         const auto put = [&](float* to, Doubles value) {
@@ -144,8 +142,9 @@ inline void set_up_triangles(TriangleSetup& work) {
     }
     const std::uint32_t asked = (work.count == 16 ? 0xffffu : (1u << work.count) - 1) & ~mask_of(outside);
     const std::uint32_t front = work.front_is_clockwise ? clockwise : ~clockwise;
-    const std::uint32_t culled =
-        flat | (work.cull == rhi::CullMode::front ? front : work.cull == rhi::CullMode::back ? ~front : 0);
+    const std::uint32_t culled = flat | (work.cull == rhi::CullMode::front  ? front
+                                         : work.cull == rhi::CullMode::back ? ~front
+                                                                            : 0);
     const std::uint32_t special = asked & mask_of(clipped);
     const std::uint32_t drawn = asked & ~special & ~culled & ~nowhere;
     work.special = special | (drawn & thin);
@@ -160,15 +159,26 @@ inline void set_up_triangles(TriangleSetup& work) {
     alignas(64) std::int32_t swapped[4][16], bits[16], numbers[16];
     store(swapped[0], x1), store(swapped[1], x2), store(swapped[2], y1), store(swapped[3], y2);
     store(bits, select(lanes_of(front), ints(Record::front_facing), ints(0)) |
-                    select(keeps, ints(0), ints(Record::swapped)) |
-                    ints(static_cast<std::int32_t>(work.draw_bits)));
+                    select(keeps, ints(0), ints(Record::swapped)) | ints(static_cast<std::int32_t>(work.draw_bits)));
     store(numbers, ints(static_cast<std::int32_t>(work.first_primitive)) + load(lane_numbers));
     // Rows of four words of a Record, in its order.
     const auto word = [](const float* from) { return reinterpret_cast<const std::int32_t*>(from); };
-    const std::int32_t* const words[16] = {a.x,        swapped[0],    swapped[1],    a.y,
-                                           swapped[2], swapped[3],    a.offset,      b.offset,
-                                           c.offset,   numbers,       bits,          word(depth),
-                                           word(slope_x), word(slope_y), word(a.window_x), word(a.window_y)};
+    const std::int32_t* const words[16] = {a.x,
+                                           swapped[0],
+                                           swapped[1],
+                                           a.y,
+                                           swapped[2],
+                                           swapped[3],
+                                           a.offset,
+                                           b.offset,
+                                           c.offset,
+                                           numbers,
+                                           bits,
+                                           word(depth),
+                                           word(slope_x),
+                                           word(slope_y),
+                                           word(a.window_x),
+                                           word(a.window_y)};
     static_assert(offsetof(Record, y) == 12 && offsetof(Record, vertex) == 24 && offsetof(Record, primitive_id) == 36 &&
                   offsetof(Record, bits) == 40 && offsetof(Record, depth_c) == 44 && offsetof(Record, x0) == 56);
     for (int lane = 0; lane < 16; lane += 4)

@@ -38,9 +38,9 @@ void fill(const ImageLevel& level, const RenderTargets& targets, const std::byte
     for (std::uint32_t sample = 0; sample < targets.samples; ++sample)
         for (std::uint32_t y = 0; y < targets.height; ++y)
             for (std::uint32_t x = 0; x < targets.width; ++x)
-                std::memcpy(level.data + sample * level.sample_stride + std::size_t{y} * level.row_stride +
-                                x * texel_bytes,
-                            texel, texel_bytes);
+                std::memcpy(
+                    level.data + sample * level.sample_stride + std::size_t{y} * level.row_stride + x * texel_bytes,
+                    texel, texel_bytes);
 }
 
 }  // namespace

@@ -13,7 +13,9 @@ llvm::Value* Math::float_to_int(Value* x, unsigned bits, bool is_signed) {
     if (number.type()->isVectorTy()) {
         // The intrinsic becomes scalar code, lane by lane (LLVM 19). The instruction's result is poison out of range,
         // which is never chosen.
-        const auto constant = [&](const llvm::APInt& value) { return number.with(llvm::ConstantInt::get(result, value)); };
+        const auto constant = [&](const llvm::APInt& value) {
+            return number.with(llvm::ConstantInt::get(result, value));
+        };
         const double limit = std::ldexp(1.0, static_cast<int>(is_signed ? bits - 1 : bits));
         const Term whole = number.with(is_signed ? emission.builder.CreateFPToSI(number.value(), result)
                                                  : emission.builder.CreateFPToUI(number.value(), result));

@@ -140,10 +140,10 @@ TEST(Clears, FillWhatIsNotDrawn) {
                     const std::uint32_t bytes = rhi::info(format).block_bytes;
                     // Depths of at most 1.
                     const float clear_depth = 0.25f;
-                    const std::uint32_t depth_bits =
-                        depth_format == Format::d16_unorm           ? 16384
-                        : depth_format == Format::d24_unorm_s8_uint ? 4194304
-                                                                    : std::bit_cast<std::uint32_t>(clear_depth);
+                    const std::uint32_t depth_bits = depth_format == Format::d16_unorm ? 16384
+                                                     : depth_format == Format::d24_unorm_s8_uint
+                                                         ? 4194304
+                                                         : std::bit_cast<std::uint32_t>(clear_depth);
                     Bench bench(width, height, {&color, &other}, &depth, {.threads = 2}, samples);
                     cpu::RenderTargets& targets = bench.targets();
                     targets.color_clears = {clear, std::nullopt};
@@ -182,7 +182,8 @@ TEST(Clears, FillWhatIsNotDrawn) {
                                 const auto* const texel =
                                     reinterpret_cast<const std::byte*>(&color.at<std::uint8_t>(x, y, sample));
                                 const bool is_clear = std::memcmp(texel, clear.data(), bytes) == 0;
-                                ASSERT_NE(is_clear, is_drawn) << rhi::info(format).name << how << ": " << x << ", " << y;
+                                ASSERT_NE(is_clear, is_drawn)
+                                    << rhi::info(format).name << how << ": " << x << ", " << y;
                                 // A target that is not cleared and not written stays as it is.
                                 kept += other.at<std::uint8_t>(x, y, sample) == 0xcc;
                                 const std::uint32_t bits = depth_format == Format::d16_unorm
@@ -204,8 +205,11 @@ TEST(Clears, LargeTargetsHoldWhatIsDrawnAndFilled) {
     const struct {
         Format format;
         std::uint32_t width, height;
-    } cases[] = {{Format::r32_uint, 2048, 2100}, {Format::r32_uint, 2051, 2063}, {Format::rg32_uint, 1502, 1500},
-                 {Format::rgba32_uint, 1100, 1001}, {Format::r8_uint, 5000, 4000}};
+    } cases[] = {{Format::r32_uint, 2048, 2100},
+                 {Format::r32_uint, 2051, 2063},
+                 {Format::rg32_uint, 1502, 1500},
+                 {Format::rgba32_uint, 1100, 1001},
+                 {Format::r8_uint, 5000, 4000}};
     for (const auto& at : cases) {
         TestImage color(at.format, at.width, at.height);
         color.fill(std::uint8_t{0xcc});
@@ -221,8 +225,9 @@ TEST(Clears, LargeTargetsHoldWhatIsDrawnAndFilled) {
         for (int i = 0; i < 60; ++i)
             for (int corner = 0; corner < 3; ++corner) {
                 const auto size = static_cast<std::uint32_t>(i % 3 == 0 ? 40 : 900);
-                corners.push_back({static_cast<std::int64_t>((static_cast<std::uint32_t>(i) * 29 + random() % size) * 256),
-                                   static_cast<std::int64_t>((static_cast<std::uint32_t>(i) * 17 + random() % size) * 256)});
+                corners.push_back(
+                    {static_cast<std::int64_t>((static_cast<std::uint32_t>(i) * 29 + random() % size) * 256),
+                     static_cast<std::int64_t>((static_cast<std::uint32_t>(i) * 17 + random() % size) * 256)});
                 vertices.push_back(at_window(static_cast<double>(corners.back().x) / 256,
                                              static_cast<double>(corners.back().y) / 256, at.width, at.height));
             }
@@ -244,7 +249,8 @@ TEST(Clears, LargeTargetsHoldWhatIsDrawnAndFilled) {
                 const std::uint8_t id = ids[std::size_t{y} * at.width + x];
                 const std::uint8_t* const texel = &color.at<std::uint8_t>(x, y);
                 if (id == 0) {
-                    ASSERT_EQ(std::memcmp(texel, clear.data(), bytes), 0) << rhi::info(at.format).name << x << ", " << y;
+                    ASSERT_EQ(std::memcmp(texel, clear.data(), bytes), 0)
+                        << rhi::info(at.format).name << x << ", " << y;
                 } else {
                     ASSERT_EQ(*texel, id) << rhi::info(at.format).name << ": " << x << ", " << y;
                 }
