@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <llvm/IR/Constants.h>
+
 #include <algorithm>
 #include <span>
-
-#include <llvm/IR/Constants.h>
 
 #include "backends/cpu/compiler/emitter.h"
 
 /// @file
-/// Vectors and structures of neighboring lanes that lie one behind the other in memory: whole vectors of words are read or
-/// written, and shuffles bring each scalar's words together. A gather or scatter for each scalar, as emit_memory.cpp makes it,
-/// is left for the edge of the range and for stores of some lanes only.
+/// Vectors and structures of neighboring lanes that lie one behind the other in memory: whole vectors of words are read
+/// or written, and shuffles bring each scalar's words together. A gather or scatter for each scalar, as emit_memory.cpp
+/// makes it, is left for the edge of the range and for stores of some lanes only.
 
 namespace nacre::cpu {
 
@@ -17,7 +17,8 @@ namespace {
 
 /// Words from lane to lane up to which elements are taken as rows. More need more shuffles than gathers cost.
 constexpr std::uint32_t most_row_words = 16;
-/// Scalars from which on it pays to ask whether all lanes mean the same address, and up to which both ways are written out.
+/// Scalars from which on it pays to ask whether all lanes mean the same address, and up to which both ways are written
+/// out.
 constexpr std::uint32_t fewest_equal_scalars = 3, most_equal_scalars = 64;
 
 /// The rest of the elements of a stream: every second one of two vectors, from `first` on.
@@ -37,7 +38,8 @@ std::vector<int> in_turns(std::uint32_t lanes, std::uint32_t first) {
 }  // namespace
 
 std::optional<Emitter::RowLayout> Emitter::row_layout(const Pointer& pointer) {
-    if (pointer.kind != Pointer::Kind::bytes || !pointer.base.is_uniform() || !pointer.dynamic_offset.linear_base) return {};
+    if (pointer.kind != Pointer::Kind::bytes || !pointer.base.is_uniform() || !pointer.dynamic_offset.linear_base)
+        return {};
     if (pointer.limit && !pointer.limit.is_uniform()) return {};
     const std::int64_t stride = pointer.dynamic_offset.linear_stride;
     if (stride < 8 || stride % 4 != 0 || stride > 4 * most_row_words || pointer.offset % 4 != 0) return {};
@@ -78,8 +80,8 @@ llvm::Value* Emitter::all(const Component& condition) {
     return builder.CreateICmpEQ(builder.CreateBitCast(condition.value, bits), llvm::Constant::getAllOnesValue(bits));
 }
 
-/// From a stream of vectors in which each lane has `stream.size()` words to one vector for each word; null where there is
-/// nothing.
+/// From a stream of vectors in which each lane has `stream.size()` words to one vector for each word; null where there
+/// is nothing.
 std::vector<llvm::Value*> Emitter::split_rows(const std::vector<llvm::Value*>& stream) {
     const std::size_t stride = stream.size();
     if (stride == 1) return stream;
@@ -88,16 +90,18 @@ std::vector<llvm::Value*> Emitter::split_rows(const std::vector<llvm::Value*>& s
         for (const std::size_t odd : {0, 1}) {
             std::vector<llvm::Value*> half(stride / 2);
             for (std::size_t i = 0; i < half.size(); ++i)
-                half[i] = builder.CreateShuffleVector(stream[2 * i], stream[2 * i + 1], every_second(lanes, static_cast<int>(odd)));
+                half[i] = builder.CreateShuffleVector(stream[2 * i], stream[2 * i + 1],
+                                                      every_second(lanes, static_cast<int>(odd)));
             const std::vector<llvm::Value*> inner = split_rows(half);
             for (std::size_t i = 0; i < inner.size(); ++i) words[2 * i + odd] = inner[i];
         }
         return words;
     }
-    for (std::size_t word = 0; word < stride; ++word) words[word] = pick(stream, [&](std::uint32_t lane) {
-        const std::size_t at = lane * stride + word;
-        return std::pair{at / lanes, at % lanes};
-    });
+    for (std::size_t word = 0; word < stride; ++word)
+        words[word] = pick(stream, [&](std::uint32_t lane) {
+            const std::size_t at = lane * stride + word;
+            return std::pair{at / lanes, at % lanes};
+        });
     return words;
 }
 
@@ -114,13 +118,15 @@ std::vector<llvm::Value*> Emitter::join_rows(const std::vector<llvm::Value*>& wo
             halves[odd] = join_rows(half);
         }
         for (std::size_t i = 0; i < stride; ++i)
-            stream[i] = builder.CreateShuffleVector(halves[0][i / 2], halves[1][i / 2], in_turns(lanes, i % 2 * lanes / 2));
+            stream[i] =
+                builder.CreateShuffleVector(halves[0][i / 2], halves[1][i / 2], in_turns(lanes, i % 2 * lanes / 2));
         return stream;
     }
-    for (std::size_t i = 0; i < stride; ++i) stream[i] = pick(words, [&](std::uint32_t element) {
-        const std::size_t at = i * lanes + element;
-        return std::pair{at % stride, at / stride};
-    });
+    for (std::size_t i = 0; i < stride; ++i)
+        stream[i] = pick(words, [&](std::uint32_t element) {
+            const std::size_t at = i * lanes + element;
+            return std::pair{at % stride, at / stride};
+        });
     return stream;
 }
 
@@ -134,11 +140,14 @@ llvm::Value* Emitter::pick(const std::vector<llvm::Value*>& vectors,
         bool any_here = false;
         for (std::uint32_t i = 0; i < lanes; ++i) {
             const auto [vector, element] = from(i);
-            if (vector == v) places[i] = static_cast<int>(element + (picked ? lanes : 0)), is_set[i] = any_here = true;
-            else if (is_set[i]) places[i] = static_cast<int>(i);
+            if (vector == v)
+                places[i] = static_cast<int>(element + (picked ? lanes : 0)), is_set[i] = any_here = true;
+            else if (is_set[i])
+                places[i] = static_cast<int>(i);
         }
         if (!any_here) continue;
-        picked = picked ? builder.CreateShuffleVector(picked, vectors[v], places) : builder.CreateShuffleVector(vectors[v], places);
+        picked = picked ? builder.CreateShuffleVector(picked, vectors[v], places)
+                        : builder.CreateShuffleVector(vectors[v], places);
     }
     return picked;
 }
@@ -199,8 +208,10 @@ std::optional<std::vector<Component>> Emitter::load_rows(const Pointer& pointer)
     for_each_component_type(pointer.type, [&](const Type& scalar) {
         const std::uint32_t place = rows->words[number++];
         llvm::Value* word = split[place];
-        if (scalar.kind == TypeKind::boolean) values.emplace_back(builder.CreateICmpNE(word, llvm::Constant::getNullValue(vector)));
-        else values.push_back(from_word(Component(word), scalar_type(scalar)));
+        if (scalar.kind == TypeKind::boolean)
+            values.emplace_back(builder.CreateICmpNE(word, llvm::Constant::getNullValue(vector)));
+        else
+            values.push_back(from_word(Component(word), scalar_type(scalar)));
         if (scalar.kind != TypeKind::boolean) row_origins[values.back().value] = {origin, place};
     });
     return values;
@@ -286,8 +297,10 @@ bool Emitter::store_rows(const Pointer& pointer, const std::vector<Component>& v
             is_full = is_full && on, is_empty = is_empty && !on;
         }
         llvm::Value* address = at_offset(start, std::int64_t{i} * lanes * 4);
-        if (is_full) builder.CreateAlignedStore(stream[i], address, llvm::Align(4));
-        else if (!is_empty) builder.CreateMaskedStore(stream[i], address, llvm::Align(4), llvm::ConstantVector::get(bits));
+        if (is_full)
+            builder.CreateAlignedStore(stream[i], address, llvm::Align(4));
+        else if (!is_empty)
+            builder.CreateMaskedStore(stream[i], address, llvm::Align(4), llvm::ConstantVector::get(bits));
     }
     builder.CreateBr(after);
 

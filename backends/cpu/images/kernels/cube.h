@@ -154,8 +154,7 @@ NACRE_INLINE CubeCorner<W> cube_corner(std::int32_t n, const CubeProjection<W>& 
     CubeCorner<W> corner;
     corner.x = truncate<W>(whole_u), corner.y = truncate<W>(whole_v);
     corner.fx = u - whole_u, corner.fy = v - whole_v;
-    corner.crosses =
-        mask_bits<W>((corner.x < 0) | (corner.y < 0) | (corner.x + 1 >= n) | (corner.y + 1 >= n)) != 0;
+    corner.crosses = mask_bits<W>((corner.x < 0) | (corner.y < 0) | (corner.x + 1 >= n) | (corner.y + 1 >= n)) != 0;
     return corner;
 }
 

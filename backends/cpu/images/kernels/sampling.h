@@ -29,7 +29,8 @@ template <int W, Codec C>
                 float rgb, alpha;
                 border_values(border, rgb, alpha);
                 for (int c = 0; c < channels; ++c) {
-                    texel[c] = taps.is_border[tap] ? splat<W>((c == 3 ? alpha : rgb) * raw_scale<C>(plan, c)) : texel[c];
+                    texel[c] =
+                        taps.is_border[tap] ? splat<W>((c == 3 ? alpha : rgb) * raw_scale<C>(plan, c)) : texel[c];
                 }
             }
             for (int c = 0; c < channels; ++c) sum[c] = sum[c] + taps.weights[tap] * texel[c];
@@ -127,7 +128,8 @@ NACRE_INLINE void footprint(const Sampling<W>& sampling, const Source& source, c
 
 /// A linear sample of a cube whose footprint lies on one face in all lanes. False: it does not, and nothing was done.
 template <int W, Codec C>
-[[gnu::noinline]] bool sample_face(const Source& source, const CubeProjection<W>& cube, Ints<W> first_slice, Floats<W>* out) {
+[[gnu::noinline]] bool sample_face(const Source& source, const CubeProjection<W>& cube, Ints<W> first_slice,
+                                   Floats<W>* out) {
     const CubeCorner<W> corner = cube_corner<W>(source.width, cube);
     if (corner.crosses) return false;
     const int channels = raw_channels<C>(*source.plan);
@@ -200,13 +202,14 @@ template <int W>
         taps.is_border[0] = x_is_border | y_is_border;
         load_tap<W>(source, taps, 0, sampler.border, texel);
     };
-    average_ellipse<W>(source, sampler, detail, sampling.coordinates, 1.0f / static_cast<float>(1u << level), live, load,
-                       out);
+    average_ellipse<W>(source, sampler, detail, sampling.coordinates, 1.0f / static_cast<float>(1u << level), live,
+                       load, out);
 }
 
 /// Mean of samples along the longer axis of an anisotropic footprint: at i / (N + 1) - 1/2 of it, i = 1 ... N.
 template <int W, typename Sample>
-NACRE_INLINE void average_along_axis(const LevelOfDetail<W>& detail, std::uint32_t live, Floats<W>* out, Sample sample) {
+NACRE_INLINE void average_along_axis(const LevelOfDetail<W>& detail, std::uint32_t live, Floats<W>* out,
+                                     Sample sample) {
     Floats<W> sum[4] = {};
     for (int i = 1; i <= 16; ++i) {
         const Ints<W> takes_part = detail.sample_count >= static_cast<float>(i);
@@ -218,8 +221,8 @@ NACRE_INLINE void average_along_axis(const LevelOfDetail<W>& detail, std::uint32
     for (int c = 0; c < 4; ++c) out[c] = sum[c] / detail.sample_count;
 }
 
-/// Visits every level that lanes read, once for all of them, from the finest on, so that a lane's sum does not depend on its
-/// neighbors: `visit(level, lanes, their weights)`.
+/// Visits every level that lanes read, once for all of them, from the finest on, so that a lane's sum does not depend
+/// on its neighbors: `visit(level, lanes, their weights)`.
 template <int W, typename Visit>
 NACRE_INLINE void add_levels(const Invocation& call, Ints<W> level, Floats<W> next_weight, Visit visit) {
     const Ints<W> has_next = next_weight > 0.0f;
@@ -255,8 +258,8 @@ NACRE_INLINE void sample_level(const Sampling<W>& sampling, const LevelOfDetail<
     });
 }
 
-/// Samples that are most common go a short way, with the same results: 2D images and arrays of them, in layouts whose texels
-/// are taken apart without choices, without borders, offsets and comparisons.
+/// Samples that are most common go a short way, with the same results: 2D images and arrays of them, in layouts whose
+/// texels are taken apart without choices, without borders, offsets and comparisons.
 template <int W>
 struct PlainSampling {
     const Invocation* call;
@@ -267,8 +270,8 @@ struct PlainSampling {
 };
 
 template <int W, Codec C>
-[[gnu::noinline]] void sample_plain_once(const PlainSampling<W>& sampling, const Source& source, Floats<W> s, Floats<W> t,
-                                         Floats<W>* out) {
+[[gnu::noinline]] void sample_plain_once(const PlainSampling<W>& sampling, const Source& source, Floats<W> s,
+                                         Floats<W> t, Floats<W>* out) {
     const FormatPlan& plan = *source.plan;
     constexpr int bytes = 4 * raw_words<C>;
     const Ints<W> slice = sampling.slice * static_cast<std::int32_t>(source.slice_stride);
@@ -302,8 +305,8 @@ template <int W, Codec C>
 }
 
 template <int W, Codec C>
-NACRE_INLINE void sample_plain_level(const PlainSampling<W>& sampling, const LevelOfDetail<W>& detail, std::uint32_t level,
-                                     Floats<W>* out) {
+NACRE_INLINE void sample_plain_level(const PlainSampling<W>& sampling, const LevelOfDetail<W>& detail,
+                                     std::uint32_t level, Floats<W>* out) {
     Source source;
     if (!make_source(*sampling.call->image, level, source)) {
         for (int c = 0; c < 4; ++c) out[c] = splat<W>(0.0f);
@@ -380,7 +383,8 @@ NACRE_INLINE bool sample_plain(const Invocation& call) {
     if (!is_array && image.dimension != rhi::ViewDimension::d2) return false;
     if (call.has(image_offset) || call.has(image_compare) || call.has(image_integer)) return false;
     if (call.sampler->is_elliptical && sampler.max_anisotropy > 1.0f) return false;
-    if (sampler.address_u == rhi::AddressMode::clamp_to_border || sampler.address_v == rhi::AddressMode::clamp_to_border)
+    if (sampler.address_u == rhi::AddressMode::clamp_to_border ||
+        sampler.address_v == rhi::AddressMode::clamp_to_border)
         return false;
     // The finest level reaches farthest.
     Source source;

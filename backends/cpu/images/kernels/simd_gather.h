@@ -80,8 +80,8 @@ NACRE_INLINE Ints<W> gather_words(const std::byte* base, Ints<W> offset) {
     return words;
 }
 
-/// The words at base + offset[lane] and the words behind them: one access of 64 bits for each lane, which costs as much as
-/// one of 32.
+/// The words at base + offset[lane] and the words behind them: one access of 64 bits for each lane, which costs as much
+/// as one of 32.
 template <int W>
 NACRE_INLINE void gather_pairs(const std::byte* base, Ints<W> offset, Ints<W>& first, Ints<W>& second) {
 #ifdef __AVX512F__
@@ -169,9 +169,9 @@ NACRE_INLINE Floats<W> square_root(Floats<W> x) {
     return root;
 }
 
-/// x / divisor as IEEE 754 rounds it; the divisor is a whole number below 2^24 and |x| is 0 or above 2^-60. By the reciprocal
-/// and the exact remainder where there are fused operations: Markstein, "Computation of elementary functions on the IBM RISC
-/// System/6000 processor", 1990, theorem 7. Zero comes out with the sign +.
+/// x / divisor as IEEE 754 rounds it; the divisor is a whole number below 2^24 and |x| is 0 or above 2^-60. By the
+/// reciprocal and the exact remainder where there are fused operations: Markstein, "Computation of elementary functions
+/// on the IBM RISC System/6000 processor", 1990, theorem 7. Zero comes out with the sign +.
 template <int W>
 NACRE_INLINE Floats<W> quotient(Floats<W> x, float divisor) {
 #ifdef __FMA__
@@ -192,8 +192,8 @@ NACRE_INLINE Floats<W> quotient(Floats<W> x, float divisor) {
 }
 
 #ifdef __F16C__
-// The processor's conversions of halves, whose bits are those of the arithmetic in lane_math.h: NaN are made quiet and keep
-// what fits of their payload, and no mode of the processor flushes a subnormal half.
+// The processor's conversions of halves, whose bits are those of the arithmetic in lane_math.h: NaN are made quiet and
+// keep what fits of their payload, and no mode of the processor flushes a subnormal half.
 template <int W>
 NACRE_INLINE Floats<W> halves_to_floats_natively(Ints<W> half) {
 #ifdef __AVX512F__
@@ -202,7 +202,8 @@ NACRE_INLINE Floats<W> halves_to_floats_natively(Ints<W> half) {
 #endif
     if constexpr (W == 8) {
         const auto words = (__m256i)half;
-        return (Floats<W>)_mm256_cvtph_ps(_mm_packus_epi32(_mm256_castsi256_si128(words), _mm256_extracti128_si256(words, 1)));
+        return (Floats<W>)_mm256_cvtph_ps(
+            _mm_packus_epi32(_mm256_castsi256_si128(words), _mm256_extracti128_si256(words, 1)));
     }
     if constexpr (W == 4) return (Floats<W>)_mm_cvtph_ps(_mm_packus_epi32((__m128i)half, (__m128i)half));
 }
@@ -210,7 +211,8 @@ template <int W>
 NACRE_INLINE Ints<W> floats_to_halves_natively(Floats<W> value) {
 #ifdef __AVX512F__
     if constexpr (W == 16)
-        return (Ints<W>)_mm512_maskz_cvtepu16_epi32(0xffff, _mm512_maskz_cvtps_ph(0xffff, (__m512)value, _MM_FROUND_TO_NEAREST_INT));
+        return (Ints<W>)_mm512_maskz_cvtepu16_epi32(
+            0xffff, _mm512_maskz_cvtps_ph(0xffff, (__m512)value, _MM_FROUND_TO_NEAREST_INT));
 #endif
     if constexpr (W == 8)
         return (Ints<W>)_mm256_cvtepu16_epi32(_mm256_cvtps_ph((__m256)value, _MM_FROUND_TO_NEAREST_INT));

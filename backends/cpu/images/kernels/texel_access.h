@@ -55,7 +55,7 @@ template <int W>
 inline constexpr int row_lanes = W < 8 ? W : 8;
 template <int W>
 NACRE_INLINE std::uint32_t row_mask(int first) {
-    return ((1u << row_lanes<W>) - 1) << first;
+    return ((1u << row_lanes<W>)-1) << first;
 }
 /// Whether the texels of the lanes from `first` on, of `bytes` bytes each, lie side by side.
 template <int W>
@@ -64,8 +64,8 @@ NACRE_INLINE bool is_row(Ints<W> offset, int first, int bytes) {
     return (mask_bits<W>(behind == 0) & row_mask<W>(first)) == row_mask<W>(first);
 }
 
-/// Texels of N words where those of every eight lanes lie side by side, as compute passes read them: plain loads cost a small
-/// part of gathers. False: they do not, or some lanes are off.
+/// Texels of N words where those of every eight lanes lie side by side, as compute passes read them: plain loads cost a
+/// small part of gathers. False: they do not, or some lanes are off.
 template <int W, int N>
 NACRE_INLINE bool read_rows(const std::byte* base, Ints<W> offset, std::uint32_t lanes, Ints<W>* words) {
     if (lanes != all_lanes<W>) return false;
@@ -163,8 +163,8 @@ template <int W>
     write_result<W>(call, all, live);
 }
 
-/// Writes texels of N words in the lanes of `stored`, in the order of the lanes. Where eight lanes' texels (or all, if there
-/// are fewer) lie side by side they are written at once.
+/// Writes texels of N words in the lanes of `stored`, in the order of the lanes. Where eight lanes' texels (or all, if
+/// there are fewer) lie side by side they are written at once.
 template <int W, int N>
 NACRE_INLINE void write_texels(std::byte* base, Ints<W> offset, const Ints<W>* words, std::uint32_t stored) {
     Ints<W> texels[N];

@@ -175,9 +175,9 @@ NACRE_INLINE int raw_channels(const FormatPlan& plan) {
 /// Words of a texel that `decode_raw` takes; 0: the codec has other ways to its texels.
 template <Codec C>
 inline constexpr int raw_words = C == Codec::word || C == Codec::rgba8 || C == Codec::srgb8 || C == Codec::half2 ? 1
-                                 : C == Codec::half4                                                              ? 2
-                                 : C == Codec::float4                                                             ? 4
-                                                                                                                  : 0;
+                                 : C == Codec::half4                                                             ? 2
+                                 : C == Codec::float4                                                            ? 4
+                                                                                                                 : 0;
 
 /// Channels of texels whose words are known, `raw_scale` times too large.
 template <int W, Codec C>
@@ -244,10 +244,11 @@ NACRE_INLINE void load_raw(const Source& source, const Place<W>& place, Floats<W
     }
 }
 
-/// Two texels of each lane. Where the second lies behind the first in all lanes, as it mostly does in a footprint, both are
-/// read at once.
+/// Two texels of each lane. Where the second lies behind the first in all lanes, as it mostly does in a footprint, both
+/// are read at once.
 template <int W, Codec C>
-NACRE_INLINE void load_two_raw(const Source& source, const Place<W>& first, const Place<W>& second, Floats<W> (&out)[2][4]) {
+NACRE_INLINE void load_two_raw(const Source& source, const Place<W>& first, const Place<W>& second,
+                               Floats<W> (&out)[2][4]) {
     if constexpr (raw_words<C> == 1) {
         Ints<W> words[2];
         if (mask_bits<W>(second.offset == first.offset + 4) == all_lanes<W>) {

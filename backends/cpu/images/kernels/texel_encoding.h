@@ -57,7 +57,8 @@ NACRE_INLINE void encode_words(const FormatPlan& plan, const Ints<W>* values, In
             const Floats<W> zero = splat<W>(0.0f), one = splat<W>(1.0f);
             const auto code = [&](int c) { return scale_and_round<W>(clamp<W>((Floats<W>)values[c], zero, one), 8); };
             const Ints<W> red = code(0), blue = code(2);
-            words[0] = (plan.red_is_third ? blue : red) | code(1) << 8 | (plan.red_is_third ? red : blue) << 16 | code(3) << 24;
+            words[0] = (plan.red_is_third ? blue : red) | code(1) << 8 | (plan.red_is_third ? red : blue) << 16 |
+                       code(3) << 24;
             return;
         }
         default: break;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Arrays of vectors and structures in buffers: lanes that read and write neighboring elements, where compiled code takes whole
-// rows of them, and lanes that mean the same element or others, at the ends of the buffers and where only some lanes run.
+// Arrays of vectors and structures in buffers: lanes that read and write neighboring elements, where compiled code
+// takes whole rows of them, and lanes that mean the same element or others, at the ends of the buffers and where only
+// some lanes run.
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
@@ -8,8 +11,6 @@
 #include <string>
 #include <tuple>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 #include "rhi/device.h"
 #include "rhi/shader_compiler.h"
@@ -20,8 +21,8 @@ namespace {
 
 constexpr std::uint32_t invocations = 192, source_elements = 150, destination_elements = 101;
 
-/// An element of an array with layout std430, and what the shader writes of it: word w of the destination is word words[w] of
-/// the source, and stays as it was where that is negative.
+/// An element of an array with layout std430, and what the shader writes of it: word w of the destination is word
+/// words[w] of the source, and stays as it was where that is negative.
 struct Element {
     const char* name;
     const char* declaration;
@@ -40,7 +41,11 @@ const std::vector<Element> elements{
     {"one_of_four", "", "uvec4", "to[i].z = x.y;", {-1, -1, 1, -1}},
     {"three", "struct E { uint a, b, c; };", "E", "to[i] = E(x.c, x.a, x.b);", {2, 0, 1}},
     {"five", "struct E { uint a, b, c, d, e; };", "E", "to[i] = E(x.e, x.c, x.a, x.d, x.b);", {4, 2, 0, 3, 1}},
-    {"six", "struct E { uvec2 a; int b; float c; uvec2 d; };", "E", "to[i] = E(x.d, x.b, x.c, x.a.yx);", {4, 5, 2, 3, 1, 0}},
+    {"six",
+     "struct E { uvec2 a; int b; float c; uvec2 d; };",
+     "E",
+     "to[i] = E(x.d, x.b, x.c, x.a.yx);",
+     {4, 5, 2, 3, 1, 0}},
     {"with_gap", "struct E { uint a; uvec2 b; };", "E", "to[i] = E(x.b.y, uvec2(x.a, x.b.x));", {3, -1, 0, 2}},
     {"eight", "struct E { uvec4 a, b; };", "E", "to[i] = E(x.b.wzyx, x.a);", {7, 6, 5, 4, 0, 1, 2, 3}},
     {"member", "struct E { uvec4 a, b; };", "E", "to[i].b = x.a;", {-1, -1, -1, -1, 0, 1, 2, 3}},
@@ -61,7 +66,8 @@ const std::vector<Index> indices{
     {"before_the_first", "i - 2u", [](std::uint32_t i) { return i - 2; }},
     {"in_steps", "numbers[i] / 23u * 7u", [](std::uint32_t i) { return i / 23 * 7; }},
     // Both are 5 elements from the begin if bytes are counted in 32 bits.
-    {"same_or_outside", "numbers[i] < 40u ? 5u : 0x20000005u", [](std::uint32_t i) { return i < 40 ? 5u : 0x20000005u; }},
+    {"same_or_outside", "numbers[i] < 40u ? 5u : 0x20000005u",
+     [](std::uint32_t i) { return i < 40 ? 5u : 0x20000005u; }},
     {"scattered", "numbers[i] * 37u % 150u", [](std::uint32_t i) { return i * 37 % 150; }},
 };
 
@@ -101,12 +107,15 @@ TEST_P(Rows, ElementsComeAndGoWhole) {
         const std::string type = element.type;
         const std::string text = std::string(element.declaration) + R"(
             layout(local_size_x = 64) in;
-            layout(set = 0, binding = 0, std430) readonly buffer From { )" + type + R"( from[]; };
-            layout(set = 0, binding = 1, std430) buffer To { )" + type + R"( to[]; };
+            layout(set = 0, binding = 0, std430) readonly buffer From { )" +
+                                 type + R"( from[]; };
+            layout(set = 0, binding = 1, std430) buffer To { )" +
+                                 type + R"( to[]; };
             layout(set = 0, binding = 2, std430) readonly buffer Numbers { uint numbers[]; };
             void main() {
                 uint i = gl_GlobalInvocationID.x;
-                )" + condition.glsl + "\n" + type + " x = from[" + index.glsl + "];\n" + element.statement + "\n}\n";
+                )" + condition.glsl +
+                                 "\n" + type + " x = from[" + index.glsl + "];\n" + element.statement + "\n}\n";
         rhi::ShaderCompiler compiler({});
         const auto code = compiler.compile({.path = "rows.comp", .text = text});
         ASSERT_TRUE(code) << code.error().message();
@@ -135,19 +144,22 @@ TEST_P(Rows, ElementsComeAndGoWhole) {
                 std::uint32_t expected = before[i * words + w];
                 const std::uint32_t read = index.of(i);
                 if (condition.of(i) && element.words[w] >= 0)
-                    expected = read < source_elements ? source[read * words + static_cast<std::size_t>(element.words[w])] : 0;
+                    expected =
+                        read < source_elements ? source[read * words + static_cast<std::size_t>(element.words[w])] : 0;
                 ASSERT_EQ(found[i * words + w], expected) << condition.name << ", invocation " << i << ", word " << w;
             }
     }
 }
 
 INSTANTIATE_TEST_SUITE_P(Cpu, Rows,
-                         testing::Combine(testing::Values("cpu:consistent:lanes=4", "cpu:fast:lanes=8", "cpu:consistent:lanes=16"),
+                         testing::Combine(testing::Values("cpu:consistent:lanes=4", "cpu:fast:lanes=8",
+                                                          "cpu:consistent:lanes=16"),
                                           testing::ValuesIn(elements), testing::ValuesIn(indices)),
                          [](const auto& test) {
-                             std::string name = std::string(std::get<0>(test.param)) + "_" + std::get<1>(test.param).name + "_" +
-                                                std::get<2>(test.param).name;
-                             std::ranges::replace_if(name, [](char c) { return c == ':' || c == '='; }, '_');
+                             std::string name = std::string(std::get<0>(test.param)) + "_" +
+                                                std::get<1>(test.param).name + "_" + std::get<2>(test.param).name;
+                             std::ranges::replace_if(
+                                 name, [](char c) { return c == ':' || c == '='; }, '_');
                              return name;
                          });
 

@@ -190,9 +190,9 @@ TEST(ImageOperations, SameBitsForEveryInstructionSetAndLaneCount) {
 
 // Samples without an offset may take a shorter way than those with one; an offset of zero changes nothing else.
 TEST(ImageOperations, SamplesGiveTheSameBitsWithAnOffsetOfZero) {
-    constexpr Format formats[] = {Format::rgba8_unorm, Format::bgra8_unorm, Format::rgba8_srgb,  Format::bgra8_srgb,
-                                  Format::r32_float,   Format::rg16_float,  Format::rgba16_float, Format::rgba32_float,
-                                  Format::rg8_unorm};
+    constexpr Format formats[] = {Format::rgba8_unorm,  Format::bgra8_unorm,  Format::rgba8_srgb,
+                                  Format::bgra8_srgb,   Format::r32_float,    Format::rg16_float,
+                                  Format::rgba16_float, Format::rgba32_float, Format::rg8_unorm};
     Random random(11);
     std::size_t not_zero = 0;
     for (int i = 0; i < 1500; ++i) {
@@ -209,13 +209,15 @@ TEST(ImageOperations, SamplesGiveTheSameBitsWithAnOffsetOfZero) {
             if (!is_coherent || p == 0) continue;
             // Neighbors mostly read the same levels.
             for (std::size_t axis = 0; axis < 3; ++axis)
-                points[p].gradient_x[axis] = points[0].gradient_x[axis], points[p].gradient_y[axis] = points[0].gradient_y[axis];
+                points[p].gradient_x[axis] = points[0].gradient_x[axis],
+                points[p].gradient_y[axis] = points[0].gradient_y[axis];
             points[p].lod = points[0].lod;
         }
         for (const std::uint32_t lanes : {4u, 8u, 16u}) {
             const NacreCpuImageFunction function = image_function(lanes);
             const auto plain = run_points(function, lanes, &image.view, &sampler, {.flags = flags}, points);
-            const auto moved = run_points(function, lanes, &image.view, &sampler, {.flags = flags | image_offset}, points);
+            const auto moved =
+                run_points(function, lanes, &image.view, &sampler, {.flags = flags | image_offset}, points);
             for (const Result& result : plain) not_zero += result[0] != 0;
             ASSERT_EQ(plain, moved) << "trial " << i << " format " << rhi::info(format).name << " lanes " << lanes;
         }
@@ -236,13 +238,15 @@ TEST(ImageOperations, RowsOfTexelsGiveTheSameInAnyOrder) {
                 const NacreCpuImageFunction function = image_function(lanes, set);
                 if (function == nullptr) continue;
                 TestImage image({.format = format, .width = 19, .height = 5}, random);
-                // Two rows of eight pixels, as a workgroup of 8 x 8 has them; some begin before or end behind the image.
+                // Two rows of eight pixels, as a workgroup of 8 x 8 has them; some begin before or end behind the
+                // image.
                 std::vector<Point> points;
                 for (std::int32_t y = -1; y < 5; ++y)
                     for (std::int32_t block = 0; block < 4; ++block)
                         for (std::int32_t x = 0; x < 8; ++x) {
                             Point& point = points.emplace_back();
-                            point.coordinates = {static_cast<std::uint32_t>(8 * block + x - 3), static_cast<std::uint32_t>(y)};
+                            point.coordinates = {static_cast<std::uint32_t>(8 * block + x - 3),
+                                                 static_cast<std::uint32_t>(y)};
                             for (auto& each : point.texel)
                                 each = kind != 0 ? random_bits(random)
                                                  : std::bit_cast<std::uint32_t>(random_float(random, -1.25f, 1.25f));
@@ -251,13 +255,14 @@ TEST(ImageOperations, RowsOfTexelsGiveTheSameInAnyOrder) {
                 for (std::size_t p = 0; p < order.size(); ++p) order[p] = p * 5 % order.size();
                 std::vector<Point> scattered;
                 for (const std::size_t p : order) scattered.push_back(points[p]);
-                const std::string what = std::string(facts.name) + " set " + std::to_string(static_cast<int>(set)) + " lanes " +
-                                         std::to_string(lanes);
+                const std::string what = std::string(facts.name) + " set " + std::to_string(static_cast<int>(set)) +
+                                         " lanes " + std::to_string(lanes);
 
                 const Request load{.flags = flags_of(ImageOperation::load) | kind};
                 const auto in_rows = run_points(function, lanes, &image.view, nullptr, load, points);
                 const auto apart = run_points(function, lanes, &image.view, nullptr, load, scattered);
-                for (std::size_t p = 0; p < order.size(); ++p) ASSERT_EQ(apart[p], in_rows[order[p]]) << what << " point " << p;
+                for (std::size_t p = 0; p < order.size(); ++p)
+                    ASSERT_EQ(apart[p], in_rows[order[p]]) << what << " point " << p;
 
                 const auto before = image.content;
                 const Request store{.flags = flags_of(ImageOperation::store) | kind};
@@ -268,7 +273,8 @@ TEST(ImageOperations, RowsOfTexelsGiveTheSameInAnyOrder) {
                 run_points(function, lanes, &image.view, nullptr, store, scattered);
                 ASSERT_EQ(image.content, written) << what;
                 // Depth and block formats are not stored to.
-                if (facts.kind != rhi::FormatKind::srgb && !facts.is_depth_stencil() && format != Format::rgb9e5_float) {
+                if (facts.kind != rhi::FormatKind::srgb && !facts.is_depth_stencil() &&
+                    format != Format::rgb9e5_float) {
                     ASSERT_NE(written, before) << what;
                 }
             }
