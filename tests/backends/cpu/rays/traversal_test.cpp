@@ -2,8 +2,13 @@
 // Traversal as compiled code calls it, in packets of every width that Embree has.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <memory>
+#include <random>
 
 #include "backends/cpu/rays/ray_query.h"
 #include "backends/cpu/rays/ray_scene.h"
@@ -191,6 +196,83 @@ TEST_P(RayTraversal, LanesOfSeveralScenesAreTracedInTheirs) {
         }
     }
     EXPECT_GT(hits, 50u);
+}
+
+TEST_P(RayTraversal, EveryBoxOnTheWayIsACandidateOnce) {
+    constexpr std::uint32_t count = 60;
+    auto device = RayDevice::create(1, GetParam());
+    ASSERT_TRUE(device) << device.error().message();
+    const auto mesh = std::make_shared<RayMesh>(*device,
+                                                std::vector{rhi::GeometryDesc{.type = rhi::GeometryType::boxes,
+                                                                              .primitive_count = count,
+                                                                              .vertex_stride = 24}},
+                                                true, rhi::BuildPreference::fast_trace);
+    std::mt19937 random(36);
+    std::uniform_real_distribution<float> around(-1, 1);
+    for (int frame = 0; frame < 3; ++frame) {
+        // Some have no place, some overlap the rays' origins, and the last are beyond the end of the source.
+        std::vector<std::array<float, 6>> boxes(count);
+        for (std::uint32_t i = 0; i < count; ++i)
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+                const float center = 2 * around(random), half = 0.6f + 0.5f * around(random);
+                boxes[i][axis] = center - half, boxes[i][axis + 3] = center + half;
+            }
+        const auto is_broken = [&](std::uint32_t i) { return i % 9 == 4 || i >= count - 2; };
+        std::vector<std::array<float, 6>> given = boxes;
+        given.resize(count - 2);
+        for (std::uint32_t i = 4; i < given.size(); i += 9)
+            given[i][i % 6] = i % 2 ? std::numeric_limits<float>::quiet_NaN() : (i % 6 < 3 ? 1e20f : -1e20f);
+        const RayGeometrySource source{reinterpret_cast<const std::byte*>(given.data()), given.size() * 24, nullptr, 0};
+        mesh->build(std::span(&source, 1), frame > 0);
+        RayScene scene(*device, false, rhi::BuildPreference::fast_trace);
+        std::vector<RayInstance> instances(1);
+        instances[0] = {.mesh = mesh, .to_world = ReferenceInstance{}.transform, .mask = 0xff};
+        // With the instance, and without.
+        if (frame == 1) instances[0].to_world[3] = 0.5f;
+        scene.build(instances, false);
+        const std::vector<ReferenceRay> rays = random_rays(320, 37 + static_cast<std::uint32_t>(frame), false);
+        std::size_t most = 0;
+        auto query = std::make_unique<RayQueryLanes>();
+        for (std::size_t first = 0; first < rays.size(); first += max_lanes) {
+            std::memset(query.get(), 0xcd, sizeof *query);
+            for (std::uint32_t lane = 0; lane < max_lanes; ++lane) {
+                const ReferenceRay& ray = rays[first + lane];
+                for (std::size_t axis = 0; axis < 3; ++axis)
+                    query->origin[axis][lane] = ray.origin[axis], query->direction[axis][lane] = ray.direction[axis];
+                query->t_min[lane] = ray.t_min, query->t[lane] = ray.t_max, query->time[lane] = 0;
+                query->cull_mask[lane] = 0xff, query->flags[lane] = 0, query->id[lane] = lane;
+                query->primitive[lane] = query->geometry[lane] = query->instance[lane] = no_hit;
+                query->scene[lane] = &scene;
+            }
+            std::vector<std::uint32_t> seen[max_lanes];
+            float last[max_lanes] = {};
+            run_query(*query, 0xffff, ray_one_scene, [&](std::uint32_t lane, std::uint32_t) {
+                EXPECT_EQ(query->candidate_kind[lane], ray_candidate_box | ray_candidate_opaque);
+                EXPECT_GE(query->candidate_t[lane], last[lane]);
+                last[lane] = query->candidate_t[lane];
+                seen[lane].push_back(query->candidate_primitive[lane]);
+                return true;  // Which is no answer to a box.
+            });
+            for (std::uint32_t lane = 0; lane < max_lanes; ++lane) {
+                ASSERT_EQ(query->geometry[lane], no_hit) << "a box was confirmed like a triangle";
+                const ReferenceRay& ray = rays[first + lane];
+                most = std::max(most, seen[lane].size());
+                for (std::uint32_t i = 0; i < count; ++i) {
+                    double enters = ray.t_min, leaves = ray.t_max;
+                    for (std::size_t axis = 0; axis < 3; ++axis) {
+                        const double shift = axis == 0 ? double{instances[0].to_world[3]} : 0;
+                        const double a = (boxes[i][axis] + shift - ray.origin[axis]) / ray.direction[axis];
+                        const double b = (boxes[i][axis + 3] + shift - ray.origin[axis]) / ray.direction[axis];
+                        enters = std::max(enters, std::min(a, b)), leaves = std::min(leaves, std::max(a, b));
+                    }
+                    if (std::abs(leaves - enters) < 1e-4) continue;
+                    const auto times = std::ranges::count(seen[lane], i);
+                    ASSERT_EQ(times, leaves > enters && !is_broken(i) ? 1 : 0) << "ray " << first + lane << ", box " << i;
+                }
+            }
+        }
+        EXPECT_GT(most, std::size_t{kept_candidates});
+    }
 }
 
 }  // namespace
