@@ -78,6 +78,12 @@ void FragmentEmitter::declare_inputs() {
         if (!variable || variable->storage != spv::StorageClass::Input) continue;
         if (variable->builtin) {
             if (*variable->builtin == BuiltIn::SampleId || *variable->builtin == BuiltIn::SamplePosition) program.runs_per_sample = true;
+            const bool is_clip = *variable->builtin == BuiltIn::ClipDistance;
+            if (!is_clip && *variable->builtin != BuiltIn::CullDistance) continue;
+            for (std::uint32_t i = 0; i < module.type(variable->type).components; ++i) {
+                input_numbers_[id].push_back(static_cast<std::uint32_t>(program.inputs.size()));
+                program.inputs.push_back({is_clip ? clip_distance_location : cull_distance_location, i, Interpolation::perspective});
+            }
             continue;
         }
         const Type& type = module.type(variable->type);
@@ -119,7 +125,15 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
         return builder.CreateAlignedLoad(builder.getFloatTy(), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4));
     };
     if (variable.builtin) {
+        if (auto of_subgroup = subgroup_input(*variable.builtin)) return std::move(*of_subgroup);
         switch (*variable.builtin) {
+            case BuiltIn::ClipDistance:
+            case BuiltIn::CullDistance: {
+                std::vector<Component> made;
+                const Type& scalar = module.type(component_type(variable.type, 0));
+                for (const std::uint32_t number : input_numbers_.at(variable.instruction.result)) made.push_back(evaluate_input(number, center, scalar));
+                return made;
+            }
             case BuiltIn::FragCoord:
                 return {Component(center.x), Component(center.y), evaluate_plane(offsetof(PrimitiveData, depth), center),
                         evaluate_plane(offsetof(PrimitiveData, inverse_w), center)};
@@ -149,7 +163,7 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
                 return made;
             }
             case BuiltIn::HelperInvocation: return {Component(builder.CreateNot(live()))};
-            default: reject("a built-in input is not supported in fragment shaders");
+            default: reject(fmt::format("built-in input {} is not supported in fragment shaders", static_cast<unsigned>(*variable.builtin)));
         }
     }
     const auto scalars = interface_scalars(module, variable);
@@ -193,7 +207,6 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
         case Op::OpDPdyCoarse: vertical = true, is_fine = false; break;
         case Op::OpFwidth: case Op::OpFwidthFine: both_ways = true; break;
         case Op::OpFwidthCoarse: both_ways = true, is_fine = false; break;
-        case Op::OpControlBarrier: reject("barriers belong into compute shaders");
         case Op::OpExtInst: {
             if (!module.is_glsl_set(at.operand(0))) return false;
             const std::uint32_t number = at.operand(1);
