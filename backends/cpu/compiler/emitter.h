@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
@@ -256,6 +257,34 @@ class Emitter {
                             const std::function<void(llvm::Value*, llvm::Value*)>& body);
     /// Runs `body` for each lane of `mask` in turn.
     void for_each_lane(llvm::Value* mask, const std::function<void(llvm::Value* lane)>& body);
+
+    // ---- Elements of neighboring lanes side by side (emit_rows.cpp)
+    /// How the elements that a pointer means lie in memory, in words of 32 bits.
+    struct RowLayout {
+        std::uint32_t stride = 0;          ///< From lane to lane.
+        std::int64_t first = 0;            ///< Bytes from the pointer to the first word that counts.
+        std::uint32_t span = 0;            ///< From there to behind the last.
+        std::vector<std::uint32_t> words;  ///< Of each scalar, from `first` on.
+    };
+    /// Nothing where the lanes' elements do not lie side by side, or are not made of words.
+    std::optional<RowLayout> row_layout(const Pointer& pointer);
+    std::optional<std::vector<Component>> load_rows(const Pointer& pointer);
+    /// False: nothing was stored, for there are no rows.
+    bool store_rows(const Pointer& pointer, const std::vector<Component>& values);
+    /// Loads of several scalars by addresses that may differ from lane to lane, but mostly do not.
+    std::optional<std::vector<Component>> load_where_equal(const Pointer& pointer);
+    llvm::Value* row_start(const Pointer& pointer, const RowLayout& rows);
+    /// Where a value of `load_rows` comes from: word `word` of the stream that begins with `stream`.
+    struct RowOrigin {
+        std::shared_ptr<const std::vector<llvm::Value*>> stream;
+        std::uint32_t word = 0;
+    };
+    std::unordered_map<llvm::Value*, RowOrigin> row_origins;
+    std::vector<llvm::Value*> split_rows(const std::vector<llvm::Value*>& stream);
+    std::vector<llvm::Value*> join_rows(const std::vector<llvm::Value*>& words);
+    llvm::Value* pick(const std::vector<llvm::Value*>& vectors,
+                      const std::function<std::pair<std::size_t, std::size_t>(std::uint32_t)>& from);
+    llvm::Value* all(const Component& condition);  ///< i1: it holds in all lanes (null: it does).
 
     /// Of the built-in variables of subgroups that all stages have; nothing of others.
     std::optional<std::vector<Component>> subgroup_input(spv::BuiltIn builtin);

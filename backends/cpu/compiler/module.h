@@ -22,7 +22,7 @@ namespace nacre::cpu {
 
 using Id = std::uint32_t;
 
-/// Types of the components of pointers, which no module declares.
+/// Types of the components of pointers (64 and 32 bits without sign), which no module declares.
 inline constexpr Id pointer_word_type = ~0u - 1, pointer_offset_type = ~0u - 2;
 
 enum class TypeKind : std::uint8_t {
