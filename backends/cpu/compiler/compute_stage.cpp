@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
 #include <llvm/IR/Constants.h>
 #include <llvm/IR/Intrinsics.h>
 
@@ -36,6 +37,7 @@ bool ComputeEmitter::emit_stage(const Instruction& at) {
 
 std::vector<Component> ComputeEmitter::input_components(const Variable& variable) {
     if (!variable.builtin) reject("an input of a compute shader is no built-in variable");
+    if (auto of_subgroup = subgroup_input(*variable.builtin)) return std::move(*of_subgroup);
     const auto range_word = [&](std::size_t offset) {
         return invariant_load(builder.getInt32Ty(), at_offset(range, static_cast<std::int64_t>(offset)), 4);
     };
@@ -55,26 +57,10 @@ std::vector<Component> ComputeEmitter::input_components(const Variable& variable
             return made;
         }
         case BuiltIn::LocalInvocationIndex: return {linear(builder.CreateMul(subgroup_index, int32(lanes)), 1)};
-        case BuiltIn::SubgroupSize: return {Component(int32(lanes))};
         case BuiltIn::NumSubgroups: return {Component(int32(subgroups))};
         case BuiltIn::SubgroupId: return {Component(subgroup_index)};
-        case BuiltIn::SubgroupLocalInvocationId: return {linear(int32(0), 1)};
         case BuiltIn::DeviceIndex: return {Component(int32(0))};
-        case BuiltIn::SubgroupEqMask: case BuiltIn::SubgroupGeMask: case BuiltIn::SubgroupGtMask: case BuiltIn::SubgroupLeMask:
-        case BuiltIn::SubgroupLtMask: {
-            const std::uint32_t used = lanes == 32 ? ~0u : (1u << lanes) - 1;
-            std::vector<std::uint32_t> words(lanes);
-            for (std::uint32_t i = 0; i < lanes; ++i) {
-                const std::uint32_t equal = 1u << i, below = equal - 1;
-                words[i] = *variable.builtin == BuiltIn::SubgroupEqMask   ? equal
-                           : *variable.builtin == BuiltIn::SubgroupGeMask ? used & ~below
-                           : *variable.builtin == BuiltIn::SubgroupGtMask ? used & ~(below | equal)
-                           : *variable.builtin == BuiltIn::SubgroupLeMask ? below | equal
-                                                                          : below;
-            }
-            return {Component(llvm::ConstantDataVector::get(context, words)), Component(int32(0)), Component(int32(0)), Component(int32(0))};
-        }
-        default: reject("a built-in input is not supported in compute shaders");
+        default: reject(fmt::format("built-in input {} is not supported in compute shaders", static_cast<unsigned>(*variable.builtin)));
     }
 }
 

@@ -57,6 +57,7 @@ class MatrixArithmetic {
 
 bool Emitter::emit_extended(const Instruction& at) {
     if (at.op != Op::OpExtInst) return false;
+    if (const std::string* set = module.foreign_set(at.operand(0))) reject(fmt::format("instruction {} of {} is not supported", at.operand(1), *set));
     if (!module.is_glsl_set(at.operand(0))) return true;  // Debug information and the like: no effect on values.
     const auto number = static_cast<GLSLstd450>(at.operand(1));
     const auto argument = [&](std::size_t i) { return get(at.operand(2 + i)); };

@@ -35,6 +35,8 @@ void Emitter::emit_instruction(const Instruction& at) {
     if (emit_stage(at) || emit_memory(at) || emit_arithmetic(at) || emit_composite(at) || emit_extended(at) ||
         emit_image(at) || emit_ray(at) || emit_atomic(at) || emit_subgroup(at))
         return;
+    // Lanes run together anyway; only workgroups wait.
+    if (at.op == Op::OpControlBarrier) return;
     reject(fmt::format("the instruction with opcode {} is not supported", static_cast<unsigned>(at.op)));
 }
 

@@ -37,6 +37,29 @@ llvm::Value* Emitter::permute(llvm::Value* values, llvm::Value* sources) {
     return is_boolean ? builder.CreateICmpNE(result, llvm::Constant::getNullValue(result->getType())) : result;
 }
 
+std::optional<std::vector<Component>> Emitter::subgroup_input(spv::BuiltIn builtin) {
+    using spv::BuiltIn;
+    switch (builtin) {
+        case BuiltIn::SubgroupSize: return {{Component(int32(lanes))}};
+        case BuiltIn::SubgroupLocalInvocationId: return {{linear(int32(0), 1)}};
+        case BuiltIn::SubgroupEqMask: case BuiltIn::SubgroupGeMask: case BuiltIn::SubgroupGtMask: case BuiltIn::SubgroupLeMask:
+        case BuiltIn::SubgroupLtMask: {
+            const std::uint32_t used = (1u << lanes) - 1;
+            std::vector<std::uint32_t> words(lanes);
+            for (std::uint32_t i = 0; i < lanes; ++i) {
+                const std::uint32_t equal = 1u << i, below = equal - 1;
+                words[i] = builtin == BuiltIn::SubgroupEqMask   ? equal
+                           : builtin == BuiltIn::SubgroupGeMask ? used & ~below
+                           : builtin == BuiltIn::SubgroupGtMask ? used & ~(below | equal)
+                           : builtin == BuiltIn::SubgroupLeMask ? below | equal
+                                                                : below;
+            }
+            return {{Component(llvm::ConstantDataVector::get(context, words)), Component(int32(0)), Component(int32(0)), Component(int32(0))}};
+        }
+        default: return std::nullopt;
+    }
+}
+
 bool Emitter::emit_subgroup(const Instruction& at) {
     const auto operand_value = [&](std::size_t i) { return get(at.operand(i)); };
     // A ballot is four words; only the first has lanes.

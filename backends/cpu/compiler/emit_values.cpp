@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <utility>
 
+#include <fmt/format.h>
 #include <llvm/IR/Constants.h>
 
 #include "backends/cpu/compiler/emitter.h"
@@ -41,6 +42,8 @@ Value Emitter::constant(Id id) {
             break;
         case Op::OpSpecConstantOp:
             value.components = evaluate(static_cast<Op>(at.operand(0)), at.type, at.operands.subspan(1), id);
+            if (value.components.empty()) value.components = evaluate_composite(static_cast<Op>(at.operand(0)), at.type, at.operands.subspan(1));
+            if (value.components.empty()) reject(fmt::format("a specialization constant is made by opcode {}, which is not supported", at.operand(0)));
             // Instructions stand for it only here.
             for (const Component& component : value.components)
                 if (!llvm::isa<llvm::Constant>(component.value)) return value;

@@ -196,6 +196,7 @@ class Emitter {
     bool emit_arithmetic(const Instruction& at);                        // emit_arithmetic.cpp
     std::vector<Component> evaluate(spv::Op op, Id type, std::span<const std::uint32_t> operands, Id result);
     bool emit_composite(const Instruction& at);                         // emit_composite.cpp
+    std::vector<Component> evaluate_composite(spv::Op op, Id type, std::span<const std::uint32_t> operands);
     bool emit_extended(const Instruction& at);                          // emit_extended.cpp
     bool emit_memory(const Instruction& at);                            // emit_memory.cpp
     bool emit_atomic(const Instruction& at);                            // emit_atomics.cpp
@@ -293,6 +294,8 @@ class Emitter {
                       const std::function<std::pair<std::size_t, std::size_t>(std::uint32_t)>& from);
     llvm::Value* all(const Component& condition);  ///< i1: it holds in all lanes (null: it does).
 
+    /// Of the built-in variables of subgroups that all stages have; nothing of others.
+    std::optional<std::vector<Component>> subgroup_input(spv::BuiltIn builtin);
     // ---- Stages: what only they know.
     virtual std::vector<Component> input_components(const Variable& variable) = 0;
     /// Base pointer and size of the workgroup's memory.

@@ -27,13 +27,6 @@ Component FragmentEmitter::primitive_word(std::size_t offset, llvm::Type* type) 
     const std::size_t aligned = offset / 16 * 16;
     const int part = static_cast<int>(offset % 16 / 4);
     auto* four = llvm::FixedVectorType::get(builder.getFloatTy(), 4);
-    llvm::SmallVector<int, 16> spread(lanes);
-    for (std::uint32_t i = 0; i < lanes; ++i) spread[i] = static_cast<int>(i / 4 * 4) + part;
-    const auto finished = [&](llvm::Value* joined) {
-        llvm::Value* value = builder.CreateShuffleVector(joined, spread);
-        return Component(type->isFloatTy() ? value : builder.CreateBitCast(value, vector_of(type)));
-    };
-    if (const auto found = joined_words_.find(aligned); found != joined_words_.end()) return finished(found->second);
     std::vector<llvm::Value*> parts;
     for (std::uint32_t q = 0; q < quads; ++q)
         parts.push_back(invariant_load(four, at_offset(primitives[q], static_cast<std::int64_t>(aligned)), 16));
@@ -48,8 +41,10 @@ Component FragmentEmitter::primitive_word(std::size_t offset, llvm::Type* type) 
         }
         parts = std::move(joined);
     }
-    if (keeps_joined_words) joined_words_.emplace(aligned, parts[0]);
-    return finished(parts[0]);
+    llvm::SmallVector<int, 16> spread(lanes);
+    for (std::uint32_t i = 0; i < lanes; ++i) spread[i] = static_cast<int>(i / 4 * 4) + part;
+    llvm::Value* value = builder.CreateShuffleVector(parts[0], spread);
+    return Component(type->isFloatTy() ? value : builder.CreateBitCast(value, vector_of(type)));
 }
 
 Component FragmentEmitter::evaluate_plane(std::size_t offset, const Place& place) {
@@ -86,10 +81,6 @@ std::vector<llvm::Value*> FragmentEmitter::evaluate_inputs() {
     std::vector<llvm::Value*> values;
     for (std::uint32_t i = 0; i < input_scalars_.size(); ++i) {
         const InterfaceScalar& at = input_scalars_[i];
-        if (at.is_wide) {  // Half of 64 bits.
-            values.push_back(primitive_word(sizeof(PrimitiveData) + i * sizeof(Plane), builder.getInt32Ty()).value);
-            continue;
-        }
         values.push_back(evaluate_input(i, at.centroid && !program.runs_per_sample ? centroid : center, module.type(at.type)).value);
     }
     values.push_back(evaluate_plane(offsetof(PrimitiveData, depth), center).value);
@@ -107,10 +98,8 @@ std::vector<llvm::Value*> FragmentEmitter::for_one_or_several(const std::functio
     const auto fill = [&](llvm::BasicBlock*& block, bool of_one) {
         builder.SetInsertPoint(block);
         is_one_primitive = of_one;
-        keeps_joined_words = !of_one;
         std::vector<llvm::Value*> values = evaluate();
-        is_one_primitive = keeps_joined_words = false;
-        joined_words_.clear();
+        is_one_primitive = false;
         block = builder.GetInsertBlock();
         builder.CreateBr(next);
         return values;
@@ -137,6 +126,15 @@ void FragmentEmitter::declare_inputs() {
         if (!variable || variable->storage != spv::StorageClass::Input) continue;
         if (variable->builtin) {
             if (*variable->builtin == BuiltIn::SampleId || *variable->builtin == BuiltIn::SamplePosition) program.runs_per_sample = true;
+            const bool is_clip = *variable->builtin == BuiltIn::ClipDistance;
+            if (!is_clip && *variable->builtin != BuiltIn::CullDistance) continue;
+            for (std::uint32_t i = 0; i < module.type(variable->type).components; ++i) {
+                input_numbers_[id].push_back(static_cast<std::uint32_t>(program.inputs.size()));
+                program.inputs.push_back({is_clip ? clip_distance_location : cull_distance_location, i, Interpolation::perspective});
+                InterfaceScalar distance;
+                distance.type = component_type(variable->type, 0);
+                input_scalars_.push_back(distance);
+            }
             continue;
         }
         const Type& type = module.type(variable->type);
@@ -155,13 +153,15 @@ void FragmentEmitter::declare_inputs() {
             program.runs_per_sample = program.runs_per_sample || (at.sample && !is_flat);
             program.uses_centroid = program.uses_centroid || (at.centroid && !is_flat);
             numbers.push_back(static_cast<std::uint32_t>(program.inputs.size()));
-            if (at.is_wide) input.interpolation = Interpolation::flat;
+            // Of 64 bits: two flat words.
+            InterfaceScalar word = at;
+            if (at.is_wide) input.interpolation = Interpolation::flat, word.type = pointer_offset_type;
             program.inputs.push_back(input);
-            input_scalars_.push_back(at);
+            input_scalars_.push_back(word);
             if (!at.is_wide) continue;
             input.location = at.upper_location, input.component = at.upper_component;
             program.inputs.push_back(input);
-            input_scalars_.push_back(at);
+            input_scalars_.push_back(word);
         }
     }
     for (const auto& [id, function] : module.functions())
@@ -180,7 +180,14 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
         return builder.CreateAlignedLoad(builder.getFloatTy(), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4));
     };
     if (variable.builtin) {
+        if (auto of_subgroup = subgroup_input(*variable.builtin)) return std::move(*of_subgroup);
         switch (*variable.builtin) {
+            case BuiltIn::ClipDistance:
+            case BuiltIn::CullDistance: {
+                std::vector<Component> made;
+                for (const std::uint32_t number : input_numbers_.at(variable.instruction.result)) made.push_back(Component(inputs_[number]));
+                return made;
+            }
             case BuiltIn::FragCoord:
                 return {Component(center.x), Component(center.y), Component(inputs_[inputs_.size() - 2]), Component(inputs_.back())};
             case BuiltIn::FrontFacing: {
@@ -209,7 +216,7 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
                 return made;
             }
             case BuiltIn::HelperInvocation: return {Component(builder.CreateNot(live()))};
-            default: reject("a built-in input is not supported in fragment shaders");
+            default: reject(fmt::format("built-in input {} is not supported in fragment shaders", static_cast<unsigned>(*variable.builtin)));
         }
     }
     const auto scalars = interface_scalars(module, variable);
@@ -217,14 +224,14 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
     if (!scalars || numbers == input_numbers_.end()) reject(fmt::format("input '{}' is not supported in fragment shaders", variable.name));
     std::vector<Component> made;
     for (std::size_t i = 0; i < scalars->size(); ++i) {
-        const InterfaceScalar& at = (*scalars)[i];
-        if (at.is_wide) {
-            const auto half = [&](std::uint32_t number) { return builder.CreateZExt(inputs_[number], vector_of(builder.getInt64Ty())); };
-            llvm::Value* bits = builder.CreateOr(half(numbers->second[i]), builder.CreateShl(half(numbers->second[i] + 1), 32));
-            made.emplace_back(builder.CreateBitCast(bits, vector_of(scalar_type(module.type(at.type)))));
+        const std::uint32_t number = numbers->second[i];
+        if (!(*scalars)[i].is_wide) {
+            made.push_back(Component(inputs_[number]));
             continue;
         }
-        made.emplace_back(inputs_[numbers->second[i]]);
+        llvm::Type* wide = vector_of(builder.getInt64Ty());
+        llvm::Value* bits = builder.CreateOr(builder.CreateZExt(inputs_[number], wide), builder.CreateShl(builder.CreateZExt(inputs_[number + 1], wide), 32));
+        made.emplace_back(builder.CreateBitCast(bits, vector_of(scalar_type(module.type((*scalars)[i].type)))));
     }
     return made;
 }
@@ -250,7 +257,6 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
         case Op::OpDPdyCoarse: vertical = true, is_fine = false; break;
         case Op::OpFwidth: case Op::OpFwidthFine: both_ways = true; break;
         case Op::OpFwidthCoarse: both_ways = true, is_fine = false; break;
-        case Op::OpControlBarrier: reject("barriers belong into compute shaders");
         case Op::OpExtInst: {
             if (!module.is_glsl_set(at.operand(0))) return false;
             const std::uint32_t number = at.operand(1);

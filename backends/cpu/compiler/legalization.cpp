@@ -38,6 +38,10 @@ class InliningPlan {
         FunctionSize* function = nullptr;
         for (const rhi::spirv::Instruction& at : rhi::spirv::instructions(words)) {
             const Op op = static_cast<Op>(at.opcode());
+            if (op == Op::OpCapability) {
+                const auto capability = static_cast<spv::Capability>(at.operand(0));
+                has_variable_pointers_ |= capability == spv::Capability::VariablePointers || capability == spv::Capability::VariablePointersStorageBuffer;
+            }
             if (function) ++function->own, ++own_instructions_;
             if (op == Op::OpLabel) ++own_blocks_;
             switch (op) {
@@ -89,6 +93,8 @@ class InliningPlan {
     /// What is left to compile.
     [[nodiscard]] std::uint64_t instructions() const { return instructions_; }
 
+    /// Pointers may be loaded from variables: SPIRV-Tools' passes for local variables take such a load for one of the value.
+    [[nodiscard]] bool has_variable_pointers() const { return has_variable_pointers_; }
     /// Basic blocks in it, about.
     [[nodiscard]] std::uint64_t blocks() const { return own_blocks_ * instructions_ / std::max<std::uint64_t>(own_instructions_, 1); }
 
@@ -145,6 +151,7 @@ class InliningPlan {
 
     std::unordered_map<std::uint32_t, FunctionSize> functions_;
     std::vector<std::uint32_t> order_;
+    bool has_variable_pointers_ = false;
     std::uint64_t instructions_ = 0, largest_entry_ = 0, own_instructions_ = 0, own_blocks_ = 0;
 };
 
@@ -193,14 +200,15 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
     optimizer.RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
         .RegisterPass(spvtools::CreateInlineExhaustivePass())
         .RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
-        .RegisterPass(spvtools::CreatePrivateToLocalPass())
-        .RegisterPass(spvtools::CreateScalarReplacementPass(100))
-        .RegisterPass(spvtools::CreateLocalAccessChainConvertPass())
-        // Access chains that nothing uses any more would keep variables from becoming values.
-        .RegisterPass(spvtools::CreateAggressiveDCEPass(true))
-        .RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass())
-        .RegisterPass(spvtools::CreateLocalSingleStoreElimPass());
-    if (plan.blocks() <= most_rewritten_blocks) optimizer.RegisterPass(spvtools::CreateSSARewritePass());
+        .RegisterPass(spvtools::CreatePrivateToLocalPass());
+    if (!plan.has_variable_pointers())
+        optimizer.RegisterPass(spvtools::CreateScalarReplacementPass(100))
+            .RegisterPass(spvtools::CreateLocalAccessChainConvertPass())
+            // Access chains that nothing uses any more would keep variables from becoming values.
+            .RegisterPass(spvtools::CreateAggressiveDCEPass(true))
+            .RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass())
+            .RegisterPass(spvtools::CreateLocalSingleStoreElimPass());
+    if (plan.blocks() <= most_rewritten_blocks && !plan.has_variable_pointers()) optimizer.RegisterPass(spvtools::CreateSSARewritePass());
     optimizer.RegisterPass(spvtools::CreateAggressiveDCEPass(true));
     spvtools::OptimizerOptions options;
     options.set_run_validator(false);

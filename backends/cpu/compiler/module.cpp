@@ -201,7 +201,8 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
         switch (op) {
             case Op::OpName: names[at.operand(0)] = at.text(1); continue;
             case Op::OpExtInstImport:
-                if (at.text(1) == "GLSL.std.450") module.glsl_set_ = instruction.result;
+                if (const std::string set = at.text(1); set == "GLSL.std.450") module.glsl_set_ = instruction.result;
+                else if (!set.starts_with("NonSemantic.") && !set.ends_with(".DebugInfo.100")) module.foreign_sets_[instruction.result] = set;
                 continue;
             case Op::OpEntryPoint:
                 if (static_cast<spv::ExecutionModel>(at.operand(0)) == model && at.text(2) == entry_point) {

@@ -22,7 +22,7 @@ namespace nacre::cpu {
 
 using Id = std::uint32_t;
 
-/// Types of the components of pointers, which no module declares.
+/// Types of the components of pointers (64 and 32 bits without sign), which no module declares.
 inline constexpr Id pointer_word_type = ~0u - 1, pointer_offset_type = ~0u - 2;
 
 enum class TypeKind : std::uint8_t {
@@ -144,6 +144,11 @@ class Module {
     [[nodiscard]] const Function& entry() const { return functions_.at(entry_); }
     [[nodiscard]] const std::vector<Id>& interface() const { return interface_; }
     [[nodiscard]] bool is_glsl_set(Id id) const { return id == glsl_set_; }
+    /// Name of another set of extended instructions that compute values; null where the set says nothing about values.
+    [[nodiscard]] const std::string* foreign_set(Id id) const {
+        const auto found = foreign_sets_.find(id);
+        return found == foreign_sets_.end() ? nullptr : &found->second;
+    }
     /// The constant that a Function or Private variable holds all the time; 0 where it changes, or is small.
     [[nodiscard]] Id constant_content(Id variable) const {
         const auto found = constant_contents_.find(variable);
@@ -179,6 +184,7 @@ class Module {
     std::unordered_map<Id, Id> result_types_;
     std::unordered_map<Id, char> no_contraction_;
     std::unordered_map<Id, Id> constant_contents_;
+    std::unordered_map<Id, std::string> foreign_sets_;
     std::vector<Id> interface_;
     Id entry_ = 0;
     Id glsl_set_ = ~0u;

@@ -109,6 +109,7 @@ Component VertexEmitter::fetch(const rhi::VertexAttribute& attribute, std::uint3
 
 std::vector<Component> VertexEmitter::input_components(const Variable& variable) {
     if (variable.builtin) {
+        if (auto of_subgroup = subgroup_input(*variable.builtin)) return std::move(*of_subgroup);
         const auto draw_word = [&](std::size_t offset) -> Component {
             return invariant_load(builder.getInt32Ty(), at_offset(draw, static_cast<std::int64_t>(offset)), 4);
         };
@@ -120,7 +121,7 @@ std::vector<Component> VertexEmitter::input_components(const Variable& variable)
             case BuiltIn::DrawIndex: return {draw_word(offsetof(VertexDraw, draw_index))};
             case BuiltIn::ViewIndex:
             case BuiltIn::DeviceIndex: return {Component(int32(0))};
-            default: reject("a built-in input is not supported in vertex shaders");
+            default: reject(fmt::format("built-in input {} is not supported in vertex shaders", static_cast<unsigned>(*variable.builtin)));
         }
     }
     const auto scalars = interface_scalars(module, variable);
@@ -199,7 +200,11 @@ void VertexEmitter::store_outputs() {
         const bool is_clip = output.builtin == BuiltIn::ClipDistance;
         if (!is_clip && output.builtin != BuiltIn::CullDistance) continue;
         const std::uint32_t first = slot_clip_distance + (is_clip ? 0 : program.clip_distances);
-        for (std::uint32_t i = 0; i < output.values.size() && first + i < first_user_slot; ++i) put(first + i, output.values[i]);
+        for (std::uint32_t i = 0; i < output.values.size() && first + i < first_user_slot; ++i) {
+            put(first + i, output.values[i]);
+            // Fragment shaders may ask for them.
+            program.outputs.push_back({is_clip ? clip_distance_location : cull_distance_location, i, first + i});
+        }
     }
     if (!has_position)
         for (std::uint32_t i = 0; i < 4; ++i) put(slot_position + i, Component(llvm::ConstantFP::get(builder.getFloatTy(), i == 3)));

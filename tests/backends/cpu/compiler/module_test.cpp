@@ -320,6 +320,89 @@ TEST_P(ForeignModule, PointersIntoWorkgroupMemoryDependOnALane) {
            [](std::uint32_t id) { return 63 - id + (id % 2 ? 1000 : 0); });
 }
 
+TEST_P(ForeignModule, APointerInAVariableMovesOnInALoop) {
+    const std::string text = assembly_head(R"(
+        OpCapability Shader
+        OpCapability VariablePointers
+        OpCapability VariablePointersStorageBuffer
+    )", R"(
+        %kept_pointer = OpTypePointer Function %pointer
+        %main = OpFunction %void None %main_type
+        %start = OpLabel
+        %kept = OpVariable %kept_pointer Function
+        %id = OpLoad %uint %index
+        %first = OpAccessChain %pointer %numbers %c0 %id
+        OpStore %kept %first
+        %rounds = OpUMod %uint %id %c4
+        OpBranch %loop
+        %loop = OpLabel
+        %round = OpPhi %uint %c0 %start %next_round %again
+        %sum = OpPhi %uint %c0 %start %next_sum %again
+        %p = OpLoad %pointer %kept
+        %goes_on = OpULessThan %bool %round %rounds
+        OpLoopMerge %done %again None
+        OpBranchConditional %goes_on %body %done
+        %body = OpLabel
+        %value = OpLoad %uint %p
+        %next_sum = OpIAdd %uint %sum %value
+        OpBranch %again
+        %again = OpLabel
+        %moved = OpPtrAccessChain %pointer %p %c1
+        OpStore %kept %moved
+        %next_round = OpIAdd %uint %round %c1
+        OpBranch %loop
+        %done = OpLabel
+        %out = OpAccessChain %pointer %result %c0 %id
+        OpStore %out %sum
+        OpReturn
+        OpFunctionEnd
+    )", false);
+    expect(ComputeRunner{GetParam()}.run_assembly(text, 0x10300), [](std::uint32_t id) {
+        std::uint32_t sum = 0;
+        for (std::uint32_t k = 0; k < id % 4; ++k) sum += id + k;
+        return sum;
+    });
+}
+
+TEST_P(ForeignModule, SpecializationConstantsAreTakenApart) {
+    const std::string text = assembly_head("OpCapability Shader\n", R"(
+        %v3 = OpTypeVector %uint 3
+        %v2 = OpTypeVector %uint 2
+        %s0 = OpSpecConstant %uint 5
+        %s1 = OpSpecConstant %uint 7
+        %s2 = OpSpecConstantOp %uint IMul %s0 %s1
+        %whole = OpSpecConstantComposite %v3 %s0 %s1 %s2
+        %turned = OpSpecConstantOp %v2 VectorShuffle %whole %whole 2 0
+        %filled = OpSpecConstantOp %v2 CompositeInsert %s1 %turned 1
+        %a = OpSpecConstantOp %uint CompositeExtract %turned 0
+        %b = OpSpecConstantOp %uint CompositeExtract %filled 1
+        %main = OpFunction %void None %main_type
+        %start = OpLabel
+        %id = OpLoad %uint %index
+        %scaled = OpIMul %uint %id %a
+        %sum = OpIAdd %uint %scaled %b
+        %out = OpAccessChain %pointer %result %c0 %id
+        OpStore %out %sum
+        OpReturn
+        OpFunctionEnd
+    )", false);
+    expect(ComputeRunner{GetParam()}.run_assembly(text, 0x10300), [](std::uint32_t id) { return id * 35 + 7; });
+}
+
+TEST_P(ForeignModule, LargeVariablesOfEachInvocation) {
+    // 400 KB of variables for each subgroup of 16 lanes, in a function that is called and in the entry point.
+    const std::string text = glsl_head + R"(
+        void main() {
+            int id = n[gl_LocalInvocationIndex];
+            uint a[3000], b[3000];
+            for (int i = 0; i < 3000; ++i) { a[i] = uint(i * id); b[2999 - i] = uint(i ^ id); }
+            result[id] = a[(id * 47) % 3000] + b[(id * 31) % 3000];
+        }
+    )";
+    expect(ComputeRunner{GetParam()}.run_glsl(text),
+           [](std::uint32_t id) { return id * 47 % 3000 * id + ((2999 - id * 31 % 3000) ^ id); });
+}
+
 // ---- Atomics, dot products, switches, structures
 
 TEST_P(ForeignModule, AtomicSumsOfFloatsAndDoubles) {

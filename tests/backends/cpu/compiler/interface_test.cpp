@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// What goes from the vertex to the fragment stage: values of 64 bits, and distances to clip planes.
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "rhi/device.h"
+#include "rhi/shader_compiler.h"
+#include "samples/backends.h"
+
+namespace nacre::cpu {
+namespace {
+
+constexpr std::uint32_t side = 4;
+
+/// Draws one triangle over a target of 4x4 pixels; the words of its pixels.
+Expected<std::vector<std::uint32_t>> draw(const char* spec, const std::string& vertex_text, const std::string& fragment_text) {
+    rhi::Instance instance(all_backends());
+    NACRE_TRY(auto device, instance.create_device({.backend = spec}));
+    rhi::ShaderCompiler compiler({});
+    NACRE_TRY(auto vertex_words, compiler.compile({.path = "interface.vert", .text = vertex_text}));
+    NACRE_TRY(auto fragment_words, compiler.compile({.path = "interface.frag", .text = fragment_text}));
+    NACRE_TRY(const auto vertex, device->create_shader(vertex_words));
+    NACRE_TRY(const auto fragment, device->create_shader(fragment_words));
+    NACRE_TRY(const auto target,
+              device->create_texture({.format = rhi::Format::rgba32_uint, .width = side, .height = side,
+                                      .usage = rhi::TextureUsage::color_target | rhi::TextureUsage::copy_source, .name = "target"}));
+    NACRE_TRY(const auto pipeline, device->create_graphics_pipeline({.vertex = vertex,
+                                                                     .fragment = fragment,
+                                                                     .color_targets = {{.format = rhi::Format::rgba32_uint}},
+                                                                     .name = "interface"}));
+    rhi::CommandList list = device->create_command_list("interface");
+    list.begin_render_pass({.color = {{.view = target, .load = rhi::LoadOperation::clear}}});
+    list.set_pipeline(pipeline);
+    list.draw({.vertex_count = 3});
+    list.end_render_pass();
+    NACRE_CHECK(device->submit(std::move(list)));
+    NACRE_TRY(const auto bytes, device->read_texture(target));
+    std::vector<std::uint32_t> words(bytes.size() / 4);
+    std::memcpy(words.data(), bytes.data(), bytes.size());
+    return words;
+}
+
+const std::string corner = "vec4 corner() { return vec4(float(gl_VertexIndex & 1) * 4.0 - 1.0, float(gl_VertexIndex >> 1) * 4.0 - 1.0, 0.0, 1.0); }\n";
+
+class Interface : public testing::TestWithParam<const char*> {};
+
+TEST_P(Interface, HandsOnDoubles) {
+    const auto words = draw(GetParam(),
+                            corner + R"(
+        layout(location = 0) flat out dvec3 three;
+        layout(location = 2) flat out double one;
+        layout(location = 3) flat out uint plain;
+        void main() {
+            three = dvec3(1.5LF, -2.25LF, 1234567890123.0LF);
+            one = 3.0LF / 7.0LF;
+            plain = 77u;
+            gl_Position = corner();
+        })",
+                            R"(
+        layout(location = 0) flat in dvec3 three;
+        layout(location = 2) flat in double one;
+        layout(location = 3) flat in uint plain;
+        layout(location = 0) out uvec4 color;
+        void main() {
+            uvec2 last = unpackDouble2x32(three.z), single = unpackDouble2x32(one);
+            color = uvec4(uint(three.x * 2.0LF) + uint(three.y * -4.0LF), last.x ^ last.y, single.x ^ single.y, plain);
+        })");
+    ASSERT_TRUE(words) << words.error().message();
+    const auto folded = [](double value) {
+        const auto bits = std::bit_cast<std::uint64_t>(value);
+        return static_cast<std::uint32_t>(bits) ^ static_cast<std::uint32_t>(bits >> 32);
+    };
+    for (std::size_t pixel = 0; pixel < side * side; ++pixel) {
+        EXPECT_EQ((*words)[pixel * 4], 3u + 9u);
+        EXPECT_EQ((*words)[pixel * 4 + 1], folded(1234567890123.0));
+        EXPECT_EQ((*words)[pixel * 4 + 2], folded(3.0 / 7.0));
+        EXPECT_EQ((*words)[pixel * 4 + 3], 77u);
+    }
+}
+
+TEST_P(Interface, ShowsDistancesToTheFragmentStage) {
+    const auto words = draw(GetParam(),
+                            corner + R"(
+        out float gl_ClipDistance[2];
+        void main() {
+            gl_Position = corner();
+            gl_ClipDistance[0] = gl_Position.x + 3.0;
+            gl_ClipDistance[1] = gl_Position.y;
+        })",
+                            R"(
+        in float gl_ClipDistance[2];
+        layout(location = 0) out uvec4 color;
+        void main() { color = uvec4(uint(gl_ClipDistance[0] * 100.0 + 0.5), uint(gl_ClipDistance[1] * 100.0 + 0.5), 1u, 1u); })");
+    ASSERT_TRUE(words) << words.error().message();
+    for (std::uint32_t y = 0; y < side; ++y)
+        for (std::uint32_t x = 0; x < side; ++x) {
+            const std::uint32_t* pixel = words->data() + (y * side + x) * 4;
+            // Centers lie at -0.75, -0.25, 0.25, 0.75; what lies behind the plane y = 0 is cut off.
+            const std::uint32_t expected_y = y < 2 ? 0 : y == 2 ? 25 : 75;
+            EXPECT_EQ(pixel[0], y < 2 ? 0u : 225 + 50 * x) << x << " " << y;
+            EXPECT_EQ(pixel[1], expected_y) << x << " " << y;
+            EXPECT_EQ(pixel[2], y < 2 ? 0u : 1u) << x << " " << y;
+        }
+}
+
+INSTANTIATE_TEST_SUITE_P(Lanes, Interface, testing::Values("cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16"),
+                         [](const auto& parameter) { return "Lanes" + std::string(parameter.param).substr(21); });
+
+}  // namespace
+}  // namespace nacre::cpu
