@@ -15,11 +15,13 @@ class CpuBuffer : public rhi::BackendBuffer {
                                                                 const rhi::BufferDesc& desc);
     [[nodiscard]] std::byte* data() const { return block_.data(); }
     [[nodiscard]] std::uint64_t size() const { return block_.size(); }
+    /// The double of each word, at twice its offset; null where the device is not in double precision.
+    [[nodiscard]] std::byte* shadow() const { return shadow_.data(); }
     /// Bytes from `offset` to the end; 0 for offsets behind it.
     [[nodiscard]] std::uint64_t size_from(std::uint64_t offset) const { return offset < size() ? size() - offset : 0; }
 
   private:
-    MemoryBlock block_;
+    MemoryBlock block_, shadow_;
 };
 
 }  // namespace nacre::cpu

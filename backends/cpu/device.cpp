@@ -61,7 +61,11 @@ CpuDevice::CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc&
       compiler_(std::move(compiler)),
       scheduler_(Scheduler::create(options.threads)),
       watchdog_(watchdog_limit()),
-      executor_(*scheduler_, watchdog_, options.lanes) {}
+      executor_(*scheduler_, watchdog_, options.lanes) {
+    // Shadows take up to 8 times what they belong to, but only where shaders write does the system give them pages.
+    if (options.mode == ExecutionMode::double_precision)
+        memory_->shadows = std::make_shared<HostMemory>(machine_memory_bytes() * 8);
+}
 
 Expected<std::unique_ptr<rhi::BackendDevice>> CpuDevice::create(const DeviceOptions& options,
                                                                 const rhi::BackendDeviceDesc& desc) try {

@@ -30,7 +30,11 @@ struct Descriptor {
     std::byte* data;              ///< Buffers: first byte of the bound range, aligned to 16.
     std::uint64_t size;           ///< Buffers: bytes of the bound range.
     const ImageView* image;       ///< Textures and images.
-    const SamplerState* sampler;  ///< Samplers and combined texture samplers.
+    union {
+        const SamplerState* sampler;  ///< Samplers and combined texture samplers.
+        /// Buffers of devices in double precision: the double of each 32-bit word of the range, at twice the word's offset.
+        std::byte* shadow;
+    };
 };
 static_assert(sizeof(Descriptor) == 32);
 
@@ -188,6 +192,22 @@ struct ImageArguments {
     alignas(64) std::uint32_t result[4][max_lanes];       ///< Zero in lanes that are not live.
 };
 
+/// The same for devices in double precision and images of floats. Integer coordinates are given as doubles, which hold them
+/// exactly.
+struct DoubleImageArguments {
+    alignas(64) double coordinates[4][max_lanes];
+    double lod[max_lanes];
+    double reference[max_lanes];
+    double gradient_x[3][max_lanes];
+    double gradient_y[3][max_lanes];
+    double min_lod[max_lanes];
+    double texel[4][max_lanes];
+    std::int32_t offset[3][max_lanes];
+    std::int32_t sample[max_lanes];
+    std::int32_t gather_offsets[4][2];
+    alignas(64) double result[4][max_lanes];              ///< Zero in lanes that are not live.
+};
+
 }  // namespace nacre::cpu
 
 // Functions that compiled code calls. `flags` is an ImageOperation with ImageFlags. `live` has one bit for each lane; samples with
@@ -196,4 +216,7 @@ struct ImageArguments {
 extern "C" {
 using NacreCpuImageFunction = void (*)(const nacre::cpu::ImageView* image, const nacre::cpu::SamplerState* sampler,
                                        nacre::cpu::ImageArguments* arguments, std::uint32_t flags, std::uint32_t live);
+using NacreCpuDoubleImageFunction = void (*)(const nacre::cpu::ImageView* image, const nacre::cpu::SamplerState* sampler,
+                                             nacre::cpu::DoubleImageArguments* arguments, std::uint32_t flags,
+                                             std::uint32_t live);
 }

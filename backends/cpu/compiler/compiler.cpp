@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <cstring>
+#include <map>
 
 #include <fmt/format.h>
 #include <llvm/IR/LLVMContext.h>
@@ -30,13 +31,15 @@ class ShaderCompilation final : public Compiler {
         std::uint64_t workgroup_bytes = 0;
         std::uint32_t subgroups = 1;
         bool has_barriers = false;
-        NACRE_TRY(program.code, compile(source, spv::ExecutionModel::GLCompute, {}, [&](llvm::Module& target, const Module& module) {
+        std::vector<NarrowedOperation> narrowed;
+        NACRE_TRY(program.code, compile(source, spv::ExecutionModel::GLCompute, {}, narrowed, [&](llvm::Module& target, const Module& module) {
                       ComputeEmitter emitter(target, module, options_, source.slots);
                       emitter.emit();
                       program.workgroup_size = module.workgroup_size;
                       workgroup_bytes = emitter.workgroup_bytes, subgroups = emitter.subgroups, has_barriers = emitter.has_barriers;
-                      return has_barriers;
+                      return Emitted{has_barriers, emitter.narrowed()};
                   }));
+        program.narrowed = std::move(narrowed);
         auto& code = static_cast<LoadedCode&>(*program.code);
         program.run = reinterpret_cast<ComputeFunction>(code.find("kernel"));
         if (!program.run) return missing(source);
@@ -54,12 +57,15 @@ class ShaderCompilation final : public Compiler {
     Expected<VertexProgram> compile_vertex(const ShaderSource& source, const VertexInput& input) override {
         VertexProgram program;
         std::shared_ptr<CompiledCode> code;
-        NACRE_TRY(code, compile(source, spv::ExecutionModel::Vertex, input, [&](llvm::Module& target, const Module& module) {
+        std::vector<NarrowedOperation> narrowed;
+        NACRE_TRY(code, compile(source, spv::ExecutionModel::Vertex, input, narrowed, [&](llvm::Module& target, const Module& module) {
                       VertexEmitter emitter(target, module, options_, source.slots, input);
                       emitter.emit();
                       program = emitter.program;
-                      return false;
+                      return Emitted{false, emitter.narrowed()};
                   }));
+        program.in_double = options_.mode == ExecutionMode::double_precision;
+        program.narrowed = std::move(narrowed);
         program.name = std::string(source.name);
         program.run = reinterpret_cast<VertexFunction>(static_cast<LoadedCode&>(*code).find("kernel"));
         program.code = std::move(code);
@@ -70,12 +76,15 @@ class ShaderCompilation final : public Compiler {
     Expected<FragmentProgram> compile_fragment(const ShaderSource& source) override {
         FragmentProgram program;
         std::shared_ptr<CompiledCode> code;
-        NACRE_TRY(code, compile(source, spv::ExecutionModel::Fragment, {}, [&](llvm::Module& target, const Module& module) {
+        std::vector<NarrowedOperation> narrowed;
+        NACRE_TRY(code, compile(source, spv::ExecutionModel::Fragment, {}, narrowed, [&](llvm::Module& target, const Module& module) {
                       FragmentEmitter emitter(target, module, options_, source.slots);
                       emitter.emit();
                       program = emitter.program;
-                      return false;
+                      return Emitted{false, emitter.narrowed()};
                   }));
+        program.in_double = options_.mode == ExecutionMode::double_precision;
+        program.narrowed = std::move(narrowed);
         program.name = std::string(source.name);
         program.run = reinterpret_cast<FragmentFunction>(static_cast<LoadedCode&>(*code).find("kernel"));
         program.code = std::move(code);
@@ -89,17 +98,23 @@ class ShaderCompilation final : public Compiler {
                     "Purge the cache (nacre cache --purge) and try again.");
     }
 
-    /// Runs `emit` on a new LLVM module and makes code of it; `emit` tells whether it has coroutines.
+    struct Emitted {
+        bool has_coroutines = false;
+        std::map<std::uint32_t, std::string> narrowed;
+    };
+
+    /// Runs `emit`, which gives an Emitted, on a new LLVM module and makes code of it.
     template <typename Emit>
-    Expected<std::shared_ptr<CompiledCode>> compile(const ShaderSource& source, spv::ExecutionModel model, const VertexInput& input, Emit&& emit) {
+    Expected<std::shared_ptr<CompiledCode>> compile(const ShaderSource& source, spv::ExecutionModel model, const VertexInput& input,
+                                                    std::vector<NarrowedOperation>& narrowed, Emit&& emit) {
         NACRE_TRY(const std::vector<std::uint32_t> words, legalize(source.spirv, source.specialization, source.name));
         NACRE_TRY(const Module module, Module::parse(words, source.entry_point, model, source.name));
         llvm::LLVMContext context;
         auto target = std::make_unique<llvm::Module>("shader", context);
         generator_->prepare(*target);
-        bool has_coroutines = false;
+        Emitted emitted;
         try {
-            has_coroutines = emit(*target, module);
+            emitted = emit(*target, module);
         } catch (const EmitError& error) {
             const std::string line = rhi::spirv::source_line(words, error.offset);
             return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", source.name),
@@ -109,6 +124,8 @@ class ShaderCompilation final : public Compiler {
             return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", source.name),
                         "the module refers to something in a way that the CPU backend does not know", "Use another backend.");
         }
+        for (const auto& [offset, operation] : emitted.narrowed)
+            narrowed.push_back({rhi::spirv::source_line(words, offset), operation});
         if (const char* dump = std::getenv("NACRE_CPU_DUMP")) {
             std::error_code problem;
             std::string file(source.name);
@@ -122,7 +139,7 @@ class ShaderCompilation final : public Compiler {
         if (options_.use_disk_cache)
             if (auto found = cache_.load("cpu", key)) object = std::move(*found);
         if (object.empty()) {
-            NACRE_TRY(object, generator_->compile(*target, std::string(source.name), has_coroutines));
+            NACRE_TRY(object, generator_->compile(*target, std::string(source.name), emitted.has_coroutines));
             if (options_.use_disk_cache) cache_.store("cpu", key, object);
         }
         NACRE_TRY(std::shared_ptr<LoadedCode> code, generator_->load(std::move(object), std::string(source.name)));

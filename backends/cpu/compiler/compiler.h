@@ -23,6 +23,9 @@ namespace nacre::cpu {
 enum class ExecutionMode : std::uint8_t {
     consistent,  ///< No contraction; results do not depend on lanes or threads.
     fast,        ///< Contraction to fused multiply-add.
+    /// The reference: floats of 16 and 32 bits are doubles in registers, and by shadow memory in buffers, images and between
+    /// the stages. No contraction.
+    double_precision,
 };
 
 struct CompilerOptions {

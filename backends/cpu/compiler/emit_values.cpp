@@ -25,9 +25,16 @@ Value Emitter::constant(Id id) {
             if (type.bits == 64) bits |= std::uint64_t{at.operand(1)} << 32;
             llvm::Type* integer = builder.getIntNTy(type.bits);
             llvm::Constant* word = llvm::ConstantInt::get(integer, type.bits < 64 ? bits & ((1ull << type.bits) - 1) : bits);
-            value.components = {type.kind == TypeKind::floating
-                                    ? llvm::ConstantExpr::getBitCast(word, scalar_type(type))
-                                    : word};
+            value.components = {word};
+            if (type.kind == TypeKind::floating) {
+                llvm::APFloat number(type.bits == 16   ? llvm::APFloat::IEEEhalf()
+                                     : type.bits == 32 ? llvm::APFloat::IEEEsingle()
+                                                       : llvm::APFloat::IEEEdouble(),
+                                     word->getUniqueInteger());
+                bool is_inexact = false;
+                if (in_double()) number.convert(llvm::APFloat::IEEEdouble(), llvm::APFloat::rmNearestTiesToEven, &is_inexact);
+                value.components = {llvm::ConstantFP::get(context, number)};
+            }
             break;
         }
         case Op::OpConstantComposite:
