@@ -71,6 +71,7 @@ using ComputeFunction = void (*)(const ShaderContext*, const WorkgroupRange*);
 struct VertexBufferBinding {
     const std::byte* data;  ///< Null where nothing is bound.
     std::uint64_t size;     ///< Bytes from `data` to the end of the buffer.
+    const std::byte* shadow;  ///< As Descriptor::shadow; null where the device is not in double precision.
 };
 
 /// What is the same for all vertices of a draw.
@@ -91,6 +92,7 @@ struct VertexBatch {
     std::uint32_t instance;            ///< gl_InstanceIndex: the first instance is added already.
     std::uint32_t count;               ///< Vertices that count; lanes behind them repeat a valid index.
     float* outputs;                    ///< `VertexProgram::output_slots` * max_lanes words, aligned to 64.
+    double* doubles;                   ///< In double precision, else null: slots of floats once more, as doubles.
 };
 using VertexFunction = void (*)(const ShaderContext*, const VertexDraw*, VertexBatch*, std::uint32_t batch_count);
 
@@ -122,6 +124,30 @@ struct alignas(16) PrimitiveData {
 };
 static_assert(sizeof(PrimitiveData) == 64);
 
+/// Planes in double precision; (x0, y0) as in DoublePrimitive.
+struct DoublePlane {
+    double c, dx, dy;
+};
+/// What fragment code of devices in double precision reads besides, at `double_primitive_offset` behind the PrimitiveData.
+struct alignas(16) DoublePrimitive {
+    double x0, y0;
+    double point_x, point_y, inverse_point_size;
+    double reserved;
+    DoublePlane planes[2];  ///< Depth and 1 / w, followed by one for each FragmentProgram::inputs (of flat integers: nothing).
+    [[nodiscard]] DoublePlane* varyings() { return planes + 2; }
+};
+static_assert(sizeof(DoublePrimitive) == 96);
+/// Planes of varyings are padded to a multiple of four.
+[[gnu::always_inline]] constexpr std::size_t double_primitive_offset(std::size_t inputs) {
+    return sizeof(PrimitiveData) + (inputs + 3) / 4 * 4 * sizeof(Plane);
+}
+
+/// Results of fragment code in double precision: those of FragmentBatch that are floats.
+struct FragmentDoubles {
+    alignas(64) double depth[max_lanes];
+    alignas(64) double colors[max_color_outputs][4][max_lanes];
+};
+
 /// Up to `lanes` / 4 quads of 2x2 pixels, of one primitive or of several. Lane 4 * q + i is pixel (x[q] + (i & 1), y[q] + (i >> 1)).
 /// Quads that are not used repeat a valid primitive and have no live lane.
 struct FragmentBatch {
@@ -133,6 +159,7 @@ struct FragmentBatch {
     std::uint32_t sample_index;  ///< gl_SampleID, where the program runs for each sample.
     /// Where inside of the pixel the shader runs: (0.5, 0.5), or the sample's place where it runs for each sample.
     float sample_x, sample_y;
+    FragmentDoubles* doubles;    ///< In double precision, else null.
     alignas(64) std::uint32_t sample_mask_in[max_lanes];   ///< gl_SampleMaskIn: covered samples.
     alignas(64) float centroid_x[max_lanes];               ///< Place inside of the pixel for centroid inputs; set where
     alignas(64) float centroid_y[max_lanes];               ///< FragmentProgram::uses_centroid.

@@ -46,7 +46,28 @@ Component FragmentEmitter::primitive_word(std::size_t offset, llvm::Type* type) 
     return Component(type->isFloatTy() ? value : builder.CreateBitCast(value, vector_of(type)));
 }
 
+Component FragmentEmitter::primitive_double(std::size_t offset) {
+    llvm::Value* all = llvm::PoisonValue::get(vector_of(builder.getDoubleTy()));
+    const auto at = static_cast<std::int64_t>(double_primitive_offset(program.inputs.size()) + offset);
+    for (std::uint32_t lane = 0; lane < lanes; ++lane) {
+        llvm::Value* value = invariant_load(builder.getDoubleTy(), at_offset(primitives[lane / 4], at), 8);
+        all = builder.CreateInsertElement(all, value, std::uint64_t{lane});
+    }
+    return Component(all);
+}
+
 Component FragmentEmitter::evaluate_plane(std::size_t offset, const Place& place) {
+    if (in_double()) {
+        // Planes of doubles lie in the same order.
+        const std::size_t plane = offsetof(DoublePrimitive, planes) +
+                                  (offset - offsetof(PrimitiveData, depth)) / sizeof(Plane) * sizeof(DoublePlane);
+        llvm::Value* from_x = builder.CreateFSub(place.x, primitive_double(offsetof(DoublePrimitive, x0)).value);
+        llvm::Value* from_y = builder.CreateFSub(place.y, primitive_double(offsetof(DoublePrimitive, y0)).value);
+        llvm::Value* along_x = builder.CreateFMul(primitive_double(plane + offsetof(DoublePlane, dx)).value, from_x);
+        llvm::Value* along_y = builder.CreateFMul(primitive_double(plane + offsetof(DoublePlane, dy)).value, from_y);
+        llvm::Value* start = primitive_double(plane + offsetof(DoublePlane, c)).value;
+        return Component(builder.CreateFAdd(builder.CreateFAdd(start, along_x), along_y));
+    }
     llvm::Value* c = primitive_word(offset + offsetof(Plane, c), builder.getFloatTy()).value;
     llvm::Value* dx = primitive_word(offset + offsetof(Plane, dx), builder.getFloatTy()).value;
     llvm::Value* dy = primitive_word(offset + offsetof(Plane, dy), builder.getFloatTy()).value;
@@ -58,6 +79,8 @@ Component FragmentEmitter::evaluate_plane(std::size_t offset, const Place& place
 Component FragmentEmitter::evaluate_input(std::uint32_t index, const Place& place, const Type& scalar) {
     const std::size_t offset = sizeof(PrimitiveData) + index * sizeof(Plane);
     const FragmentInput& input = program.inputs[index];
+    if (input.interpolation == Interpolation::flat && in_double() && scalar.kind == TypeKind::floating)
+        return primitive_double(sizeof(DoublePrimitive) + index * sizeof(DoublePlane) + offsetof(DoublePlane, c));
     if (input.interpolation == Interpolation::flat) return from_word(primitive_word(offset, builder.getInt32Ty()), scalar_type(scalar));
     Component value = evaluate_plane(offset, place);
     if (input.interpolation == Interpolation::perspective) {
@@ -65,7 +88,7 @@ Component FragmentEmitter::evaluate_input(std::uint32_t index, const Place& plac
         llvm::Value* one = llvm::ConstantFP::get(inverse->getType(), 1);
         value = Component(builder.CreateFMul(value.value, builder.CreateFDiv(one, inverse)));
     }
-    return scalar.bits == 32 ? value : Component(math.convert_float(value.value, scalar_type(scalar)));
+    return scalar.bits == 32 || in_double() ? value : Component(math.convert_float(value.value, scalar_type(scalar)));
 }
 
 FragmentEmitter::Place FragmentEmitter::place_at(llvm::Value* inside_x, llvm::Value* inside_y) {
@@ -129,6 +152,14 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
             case BuiltIn::ViewportIndex:
             case BuiltIn::DeviceIndex: return {Component(int32(0))};
             case BuiltIn::PointCoord: {
+                if (in_double()) {
+                    const Component scale = primitive_double(offsetof(DoublePrimitive, inverse_point_size));
+                    const auto inside = [&](llvm::Value* place, std::size_t offset) {
+                        llvm::Value* from = primitive_double(offset).value;
+                        return Component(builder.CreateFMul(builder.CreateFSub(place, from), scale.value));
+                    };
+                    return {inside(center.x, offsetof(DoublePrimitive, point_x)), inside(center.y, offsetof(DoublePrimitive, point_y))};
+                }
                 llvm::Value* scale = primitive_word(offsetof(PrimitiveData, inverse_point_size), builder.getFloatTy()).value;
                 llvm::Value* left = primitive_word(offsetof(PrimitiveData, point_x), builder.getFloatTy()).value;
                 llvm::Value* top = primitive_word(offsetof(PrimitiveData, point_y), builder.getFloatTy()).value;
@@ -138,7 +169,8 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
             case BuiltIn::SampleId:
                 return {Component(builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, sample_index)), llvm::Align(4)))};
             case BuiltIn::SamplePosition:
-                return {Component(float_word(offsetof(FragmentBatch, sample_x))), Component(float_word(offsetof(FragmentBatch, sample_y)))};
+                return {from_single(float_word(offsetof(FragmentBatch, sample_x))),
+                        from_single(float_word(offsetof(FragmentBatch, sample_y)))};
             case BuiltIn::SampleMask: {
                 std::vector<Component> made(module.type(variable.type).components, Component(int32(0)));
                 made[0] = Component(builder.CreateAlignedLoad(vector_of(builder.getInt32Ty()), at_offset(batch, offsetof(FragmentBatch, sample_mask_in)), llvm::Align(64)));
@@ -191,15 +223,15 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
             if (number == GLSLstd450InterpolateAtOffset) {
                 const Value offset = get(at.operand(3));
                 const auto shifted = [&](const Component& by) {
-                    return builder.CreateFAdd(widen(by), llvm::ConstantFP::get(vector_of(builder.getFloatTy()), 0.5));
+                    return builder.CreateFAdd(widen(by), llvm::ConstantFP::get(vector_of(real_type()), 0.5));
                 };
                 place = place_at(shifted(offset.components.at(0)), shifted(offset.components.at(1)));
             } else if (number == GLSLstd450InterpolateAtSample) {
                 llvm::Value* which = widen(get_scalar(at.operand(3)));
                 llvm::Value *x = nullptr, *y = nullptr;
                 for (std::size_t i = sample_places.size(); i-- > 0;) {
-                    llvm::Value* here_x = llvm::ConstantFP::get(vector_of(builder.getFloatTy()), static_cast<double>(sample_places[i][0]));
-                    llvm::Value* here_y = llvm::ConstantFP::get(vector_of(builder.getFloatTy()), static_cast<double>(sample_places[i][1]));
+                    llvm::Value* here_x = llvm::ConstantFP::get(vector_of(real_type()), static_cast<double>(sample_places[i][0]));
+                    llvm::Value* here_y = llvm::ConstantFP::get(vector_of(real_type()), static_cast<double>(sample_places[i][1]));
                     llvm::Value* is_this = builder.CreateICmpEQ(which, llvm::ConstantInt::get(which->getType(), i));
                     x = x ? select(is_this, here_x, x) : here_x;
                     y = y ? select(is_this, here_y, y) : here_y;
@@ -231,6 +263,12 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
 }
 
 void FragmentEmitter::store_outputs() {
+    llvm::Value* doubles =
+        in_double() ? invariant_load(pointer_type, at_offset(batch, offsetof(FragmentBatch, doubles)), 8) : nullptr;
+    const auto put_double = [&](std::size_t offset, const Component& value) {
+        if (value.value->getType()->getScalarType()->isDoubleTy())
+            builder.CreateAlignedStore(widen(value), at_offset(doubles, static_cast<std::int64_t>(offset)), llvm::Align(64));
+    };
     for (const Id id : module.interface()) {
         const Variable* variable = module.variable(id);
         if (!variable || variable->storage != spv::StorageClass::Output) continue;
@@ -239,7 +277,11 @@ void FragmentEmitter::store_outputs() {
             const auto put = [&](std::size_t offset) {
                 builder.CreateAlignedStore(widen(to_word(values.at(0))), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
             };
-            if (*variable->builtin == BuiltIn::FragDepth) program.writes_depth = true, put(offsetof(FragmentBatch, depth));
+            if (*variable->builtin == BuiltIn::FragDepth) {
+                program.writes_depth = true;
+                put(offsetof(FragmentBatch, depth));
+                put_double(offsetof(FragmentDoubles, depth), values.at(0));
+            }
             else if (*variable->builtin == BuiltIn::SampleMask) program.writes_sample_mask = true, put(offsetof(FragmentBatch, sample_mask_out));
             else reject("a built-in output is not supported in fragment shaders");
             continue;
@@ -252,6 +294,7 @@ void FragmentEmitter::store_outputs() {
             if (output >= max_color_outputs || at.component >= 4) reject("a color output lies behind the last location");
             const std::size_t offset = offsetof(FragmentBatch, colors) + (output * 4 + at.component) * max_lanes * 4;
             builder.CreateAlignedStore(widen(to_word(values[i])), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
+            put_double(offsetof(FragmentDoubles, colors) + (output * 4 + at.component) * max_lanes * 8, values[i]);
             auto found = std::ranges::find(program.outputs, output, &FragmentOutput::output);
             if (found == program.outputs.end()) program.outputs.push_back({output, at.component + 1});
             else found->components = std::max(found->components, at.component + 1);
@@ -284,17 +327,20 @@ void FragmentEmitter::emit_batch() {
     llvm::Value* y = corner(offsetof(FragmentBatch, y));
     std::vector<std::uint32_t> step_x(lanes), step_y(lanes);
     for (std::uint32_t i = 0; i < lanes; ++i) step_x[i] = i & 1, step_y[i] = i >> 1 & 1;
-    pixel_x = builder.CreateSIToFP(builder.CreateAdd(x, llvm::ConstantDataVector::get(context, step_x)), vector_of(builder.getFloatTy()));
-    pixel_y = builder.CreateSIToFP(builder.CreateAdd(y, llvm::ConstantDataVector::get(context, step_y)), vector_of(builder.getFloatTy()));
+    pixel_x = builder.CreateSIToFP(builder.CreateAdd(x, llvm::ConstantDataVector::get(context, step_x)), vector_of(real_type()));
+    pixel_y = builder.CreateSIToFP(builder.CreateAdd(y, llvm::ConstantDataVector::get(context, step_y)), vector_of(real_type()));
     declare_inputs();
     const auto batch_float = [&](std::size_t offset) {
-        return splat(builder.CreateAlignedLoad(builder.getFloatTy(), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4)));
+        llvm::Value* number = builder.CreateAlignedLoad(builder.getFloatTy(), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4));
+        return splat(from_single(number).value);
     };
     center = place_at(batch_float(offsetof(FragmentBatch, sample_x)), batch_float(offsetof(FragmentBatch, sample_y)));
     centroid = center;
     if (program.uses_centroid) {
         const auto lane_float = [&](std::size_t offset) {
-            return builder.CreateAlignedLoad(vector_of(builder.getFloatTy()), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
+            llvm::Value* numbers =
+                builder.CreateAlignedLoad(vector_of(builder.getFloatTy()), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
+            return from_single(numbers).value;
         };
         centroid = place_at(lane_float(offsetof(FragmentBatch, centroid_x)), lane_float(offsetof(FragmentBatch, centroid_y)));
     }

@@ -64,6 +64,7 @@ class FragmentEmitter final : public Emitter {
     Component evaluate_plane(std::size_t offset, const Place& place);  ///< Of the plane at a byte offset in PrimitiveData.
     Component evaluate_input(std::uint32_t index, const Place& place, const Type& scalar);
     Component primitive_word(std::size_t offset, llvm::Type* type);
+    Component primitive_double(std::size_t offset);  ///< Of DoublePrimitive.
     Place place_at(llvm::Value* inside_x, llvm::Value* inside_y);
     Component difference(const Component& value, bool vertical, bool is_fine);
     void emit_batch();

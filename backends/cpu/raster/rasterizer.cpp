@@ -52,6 +52,7 @@ struct Rasterizer::State {
     std::vector<ChunkScratch> scratch;
     std::vector<AlignedMemory> workspaces;
     std::vector<AlignedMemory> primitive_memory;
+    std::vector<AlignedMemory> double_memory;
     std::vector<ChunkView> views;
     std::vector<const DrawPlan*> plans;
     std::vector<std::uint32_t> busy_tiles;
@@ -64,7 +65,8 @@ struct Rasterizer::State {
           kernels(choose_kernels(of_options.instruction_set)),
           scratch(of_scheduler.thread_count()),
           workspaces(of_scheduler.thread_count()),
-          primitive_memory(of_scheduler.thread_count()) {
+          primitive_memory(of_scheduler.thread_count()),
+          double_memory(of_scheduler.thread_count()) {
         for (AlignedMemory& memory : workspaces) {
             memory.reserve(sizeof(Workspace), 0);
             std::memset(memory.data(), 0, sizeof(Workspace));
@@ -166,6 +168,11 @@ struct Rasterizer::State {
         for (std::uint32_t thread = 0; thread < primitive_memory.size(); ++thread) {
             primitive_memory[thread].reserve(primitive_bytes * primitive_slots, 0);
             workspace(thread).primitives = primitive_memory[thread].data();
+            workspace(thread).doubles = nullptr;
+            if (!draws[0]->plan.in_double) continue;
+            constexpr std::size_t bytes = stream_batches * sizeof(FragmentDoubles);
+            if (double_memory[thread].reserve(bytes, 0)) std::memset(double_memory[thread].data(), 0, bytes);
+            workspace(thread).doubles = reinterpret_cast<FragmentDoubles*>(double_memory[thread].data());
         }
         const TileJob job{&targets,     views.data(), static_cast<std::uint32_t>(views.size()),
                           plans.data(), lanes,        &srgb_tables()};

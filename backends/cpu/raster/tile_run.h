@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "backends/cpu/raster/double_precision.h"
 #include "backends/cpu/raster/primitive_setup.h"
 #include "backends/cpu/raster/tile_output.h"
 #include "backends/cpu/raster/tile_pixels.h"
@@ -126,7 +127,7 @@ struct TileRun {
             stencil_changed = true;
         }
         lowers_depth = !keeps_farther(plan.compare), raises_depth = !keeps_nearer(plan.compare);
-        simple_depth = targets.samples == 1 && !draw->late_tests && !stencil;
+        simple_depth = targets.samples == 1 && !draw->late_tests && !stencil && !draw->in_double;
         depth_low = plan.clamps ? plan.clamp_low : 0.0f;
         depth_high = plan.clamps ? plan.clamp_high : 1.0f;
     }
@@ -144,6 +145,23 @@ struct TileRun {
     }
     [[gnu::always_inline]] Ints key_at(const Floats& x, const Floats& y) const {
         return depth_key(targets.depth_layout, depth_at(x, y), depth_low, depth_high);
+    }
+
+    /// In double precision: depths of a sample of the pixels of the block at (x, y), clamped, and their keys.
+    Ints double_keys(std::int32_t x, std::int32_t y, float offset_x, float offset_y, double (&depths)[16]) {
+        const DoublePrimitive& planes = double_primitive(current_primitive(), *draw);
+        alignas(64) float rounded[16];
+        for (std::uint32_t lane = 0; lane < 16; ++lane) {
+            const double z = raster::depth_at(planes, x + lane_x[lane] + static_cast<double>(offset_x),
+                                              y + lane_y[lane] + static_cast<double>(offset_y));
+            keep_depth(z, depths[lane], rounded[lane]);
+        }
+        return depth_key(targets.depth_layout, load(rounded), depth_low, depth_high);
+    }
+    void keep_depth(double z, double& kept, float& rounded) const {
+        kept = z > static_cast<double>(depth_low) ? z : static_cast<double>(depth_low);
+        if (kept > static_cast<double>(depth_high)) kept = static_cast<double>(depth_high);
+        rounded = static_cast<float>(z);
     }
 
     /// @param place  of a block, or of a quad in it
@@ -213,6 +231,7 @@ struct TileRun {
                 memory.primitives + static_cast<std::size_t>(next_slot) * draw->primitive_bytes);
             next_slot = (next_slot + 1) % primitive_slots;
             set_up_primitive(*draw, *record, vertex_memory, *slot);
+            if (draw->in_double) set_up_double_primitive(*draw, targets.depth_layout, *record, vertex_memory, *slot);
             primitive = slot;
         }
         return *primitive;
@@ -307,6 +326,7 @@ struct TileRun {
         for (std::uint32_t quad = 0; quad < max_quads; ++quad)
             batch.live |= quad < quads ? stream.live[first + quad] << (4 * quad) : 0;
         batch.sample_index = stream_index;
+        batch.doubles = memory.doubles ? memory.doubles + (&batch - memory.batches) : nullptr;
         const bool single = draw->runs_per_sample;
         batch.sample_x = single ? static_cast<float>(sample_offset_x[stream_index]) / subpixels : 0.5f;
         batch.sample_y = single ? static_cast<float>(sample_offset_y[stream_index]) / subpixels : 0.5f;
@@ -411,9 +431,21 @@ struct TileRun {
                             std::uint32_t mask, bool one_by_one, std::uint32_t quads) {
         if (!depth && !stencil) return mask;
         Ints key = ints(0);
+        double exact_depths[16];
         if (depth) {
             alignas(64) float z[16];
-            if (draw->writes_depth) {
+            if (draw->in_double) {
+                const float offset_x = targets.samples == 1 ? 0.5f : static_cast<float>(sample_offset_x[sample]) / subpixels;
+                const float offset_y = targets.samples == 1 ? 0.5f : static_cast<float>(sample_offset_y[sample]) / subpixels;
+                for (std::uint32_t lane = 0; lane < 16; ++lane) {
+                    const std::uint32_t quad = lane / 4 < quads ? lane / 4 : 0;
+                    const double x = batch.x[quad] + static_cast<std::int32_t>(lane & 1) + static_cast<double>(offset_x);
+                    const double y = batch.y[quad] + static_cast<std::int32_t>(lane >> 1 & 1) + static_cast<double>(offset_y);
+                    const double exact = draw->writes_depth ? batch.doubles->depth[lane]
+                                                            : raster::depth_at(double_primitive(*batch.primitives[quad], *draw), x, y);
+                    keep_depth(exact, exact_depths[lane], z[lane]);
+                }
+            } else if (draw->writes_depth) {
                 std::memcpy(z, batch.depth, sizeof(z));
             } else {
                 const float offset_x =
@@ -444,6 +476,10 @@ struct TileRun {
                 if (depth && draw->depth_stencil.depth_write && (passed >> (4 * quad) & 15) != 0) {
                     std::memcpy(memory.depth[sample] + places[quad], depths + 4 * quad, 16);
                     depth_written(places[quad]);
+                    for (std::uint32_t i = 0; draw->in_double && i < 4; ++i)
+                        if (passed >> (4 * quad + i) & 1)
+                            store_depth(targets, sample, batch.x[quad] + static_cast<std::int32_t>(i & 1),
+                                        batch.y[quad] + static_cast<std::int32_t>(i >> 1), exact_depths[4 * quad + i]);
                 }
                 if (stencil) std::memcpy(memory.stencil[sample] + places[quad], stencils + 4 * quad, 16);
             }
@@ -459,6 +495,11 @@ struct TileRun {
     void write_color(const ColorPlan& plan, const FragmentBatch& batch, const std::uint32_t (&masks)[most_samples],
                      std::uint32_t first, std::uint32_t end, bool conflict) {
         const ColorTarget& target = targets.colors[plan.target];
+        if (draw->in_double && target.shadow) {
+            for (std::uint32_t sample = first; sample < end; ++sample)
+                if (masks[sample] != 0) write_double_colors(*draw, plan, target, batch, sample, masks[sample]);
+            return;
+        }
         alignas(64) std::uint32_t words[4][16];
         const bool reads = plan.blends || plan.partial;
         if (!reads) pack_colors(plan, target, *job.srgb, batch, words);
