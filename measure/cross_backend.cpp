@@ -66,10 +66,61 @@ Error named(Error error, const std::string& backend) {
     return error;
 }
 
+bool is_more_precise(const Contestant& reference, const Contestant& test) {
+    return reference.device && test.device && reference.device->capabilities().float_bits > test.device->capabilities().float_bits;
+}
+
+// What the invocation that made a texel computed on one device; the last pass that writes the texture counts.
+Expected<rhi::InvocationTrace> trace_texel(const Contestant& contestant, const std::string& pass, const WrongValue& texel) {
+    rhi::TraceRequest request{.shader = pass, .x = texel.x, .y = texel.y, .z = texel.layer};
+    const auto run = [&]() -> Expected<rhi::Trace> {
+        NACRE_CHECK(contestant.device->start_trace(request));
+        auto frame = contestant.renderer.render_frame();
+        auto trace = contestant.device->finish_trace();
+        if (!frame) return std::unexpected(frame.error());
+        return trace;
+    };
+    NACRE_TRY(rhi::Trace trace, run());
+    if (!trace.writers.empty()) {
+        request.invocation = trace.writers.back();
+        NACRE_TRY(trace, run());
+    }
+    if (trace.invocations.empty())
+        return fail(ErrorCode::not_found, "trace texel", fmt::format("({}, {})", texel.x, texel.y),
+                    fmt::format("no shader of pass '{}' made it", pass));
+    return std::move(trace.invocations.back());
+}
+
+void find_origin(const Contestant& reference, const Contestant& test, BackendResult& result) {
+    const NumericalError* const largest = SceneComparison::largest_error(result);
+    if (!largest) return;
+    std::string passes;
+    for (const IntermediateDescription& description : test.renderer.intermediates())
+        if (description.name == largest->texture) passes = description.written_by;
+    const std::size_t comma = passes.rfind(", ");
+    std::string last = comma == std::string::npos ? passes : passes.substr(comma + 2);
+    std::ranges::replace(last, ' ', '_');  // The folder of the pass, where its shaders are.
+    auto from = trace_texel(reference, last, largest->largest);
+    auto to = from ? trace_texel(test, last, largest->largest) : from;
+    if (!to) {
+        result.no_origin = to.error().message();
+        return;
+    }
+    if (from->shader != to->shader) {
+        result.no_origin = fmt::format("'{}' made the texel in double precision, '{}' in single precision", from->shader, to->shader);
+        return;
+    }
+    result.origin = find_error_origin(*from, *to);
+    if (!result.origin)
+        result.no_origin = fmt::format("both precisions compute the same in '{}' up to where they part: another surface is seen", to->shader);
+}
+
 // All layers and mips of one texture on two devices.
 Expected<TextureDifference> compare_texture(const Contestant& reference, const Contestant& test,
                                             const IntermediateDescription& description, bool with_pictures,
                                             BackendResult& result) {
+    NumericalError error{.texture = description.name};
+    const bool measures_error = is_more_precise(reference, test);
     TextureDifference sum{.name = description.name};
     std::optional<TexturePictures> pictures;
     for (std::uint32_t mip = 0; mip < description.mips; ++mip) {
@@ -82,6 +133,13 @@ Expected<TextureDifference> compare_texture(const Contestant& reference, const C
             const TextureData data_b = texture_data_of(*std::move(b));
             NACRE_TRY(const TextureDifference part, compare_contents(data_a, data_b));
             accumulate(sum, part);
+            if (measures_error && data_a.format == data_b.format) {
+                // Packed words have no more than their bits.
+                std::vector<double> exact;
+                if (data_a.fields.empty() && !rhi::info(data_a.format).is_integer())
+                    if (auto values = reference.renderer.read_exact_intermediate(description.name, layer, mip)) exact = *std::move(values);
+                NACRE_CHECK(add_numerical_error(data_a, data_b, exact, layer, mip, error));
+            }
             if (with_pictures && part.differing > 0 && !pictures && data_a.format == data_b.format) {
                 NACRE_TRY(Image picture, picture_of(data_a));
                 NACRE_TRY(Image mask, difference_mask(data_a, data_b));
@@ -89,6 +147,7 @@ Expected<TextureDifference> compare_texture(const Contestant& reference, const C
             }
         }
     }
+    if (error.values > 0) result.errors.push_back(std::move(error));
     if (pictures) result.texture_pictures.push_back(*std::move(pictures));
     return sum;
 }
@@ -180,12 +239,21 @@ Expected<SceneComparison> compare_backends(std::string scene, std::span<const Co
         comparison.backends.push_back(std::move(result));
         if (&contestant == &contestants.front()) continue;
         BackendResult& test = comparison.backends.back();
-        if (options.textures) NACRE_CHECK(compare_all_textures(contestants.front(), contestant, options, test));
+        if (options.textures) {
+            NACRE_CHECK(compare_all_textures(contestants.front(), contestant, options, test));
+            find_origin(contestants.front(), contestant, test);
+        }
         NACRE_TRY(test.final,
                   compare_pictures(linear_from_srgb_bytes(comparison.backends.front().picture.tone_mapped),
                                    linear_from_srgb_bytes(test.picture.tone_mapped)));
     }
+    if (contestants.front().device) comparison.narrowed = contestants.front().device->narrowed_operations();
     return comparison;
+}
+
+const NumericalError* SceneComparison::largest_error(const BackendResult& result) {
+    const auto found = std::ranges::max_element(result.errors, {}, &NumericalError::share);
+    return found == result.errors.end() || found->largest.error == 0.0 ? nullptr : &*found;
 }
 
 std::vector<std::string> violations_of(const SceneComparison& comparison, const Tolerance& tolerance) {
@@ -239,15 +307,37 @@ std::string to_json(const SceneComparison& comparison) {
                                     {"max_abs", finite(texture.max_abs)},
                                     {"max_rel", finite(texture.max_rel)}});
         }
+        Json errors = Json::array();
+        const auto error_json = [](const NumericalError& error) {
+            return Json{{"texture", error.texture}, {"values", error.values}, {"exact", error.is_exact},
+                        {"max_abs", finite(error.largest.error)}, {"max_rel", finite(error.max_rel)}, {"rms", finite(error.rms)},
+                        {"share", finite(error.share())}, {"pixel", {error.largest.x, error.largest.y}},
+                        {"layer", error.largest.layer}, {"mip", error.largest.mip}, {"field", error.largest.name},
+                        {"reference", finite(error.largest.reference)}, {"value", finite(error.largest.value)}};
+        };
+        for (const NumericalError& error : result.errors) errors.push_back(error_json(error));
+        Json origin = nullptr;
+        if (result.origin)
+            origin = Json{{"shader", result.origin->shader}, {"line", result.origin->line}, {"operation", result.origin->operation},
+                          {"reference", finite(result.origin->reference)}, {"value", finite(result.origin->value)},
+                          {"growth", finite(result.origin->growth)}};
+        const NumericalError* const largest = SceneComparison::largest_error(result);
         results.push_back(Json{{"backend", result.backend},
                                {"textures", std::move(textures)},
+                               {"numerical_errors", std::move(errors)},
+                               {"largest_error", largest ? error_json(*largest) : Json(nullptr)},
+                               {"origin", std::move(origin)},
                                {"final",
                                 {{"psnr_db", result.final.psnr_db},
                                  {"flip_mean", result.final.flip_mean},
                                  {"max_abs_8bit", result.final.max_abs_8bit},
                                  {"share_above_1", result.final.share_above_1}}}});
     }
+    Json narrowed = Json::array();
+    for (const rhi::NarrowedOperation& operation : comparison.narrowed)
+        narrowed.push_back(Json{{"shader", operation.shader}, {"line", operation.line}, {"operation", operation.operation}});
     return Json{{"scene", comparison.scene},
+                {"narrowed", std::move(narrowed)},
                 {"reference", comparison.backends.empty() ? "" : comparison.backends.front().backend},
                 {"results", std::move(results)}}
                .dump(2, ' ', false, Json::error_handler_t::replace) +

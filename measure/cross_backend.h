@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "core/error.h"
 #include "measure/frame_times.h"
 #include "measure/image_metrics.h"
+#include "measure/numerical_error.h"
 #include "measure/texture_comparison.h"
 #include "measure/tolerance.h"
 #include "passes/renderer.h"
@@ -30,6 +32,8 @@ struct Contestant {
     std::string backend;  ///< As written on the command line: "gl", "cpu:double".
     std::string device;   ///< For people.
     passes::Renderer& renderer;
+    /// The renderer's, to find out where errors begin; null: that is left out.
+    rhi::Device* device = nullptr;
 };
 
 /// What a texture looked like on both sides, for people.
@@ -51,12 +55,22 @@ struct BackendResult {
     std::vector<std::string> missing;          ///< Textures of the reference that this backend lacks.
     std::vector<std::string> added;            ///< Textures that the reference lacks.
     PictureDifference final;
+    /// Where the reference is in double precision (Capabilities::float_bits) and this backend is not: of every texture of
+    /// numbers in `textures`, and where the largest of them begins.
+    std::vector<NumericalError> errors;
+    std::optional<ErrorOrigin> origin;
+    std::string no_origin;                     ///< Why there is none.
     std::vector<TexturePictures> texture_pictures;
 };
 
 struct SceneComparison {
     std::string scene;
     std::vector<BackendResult> backends;  ///< The reference first.
+    /// Of a reference in double precision: what went through single precision all the same.
+    std::vector<rhi::NarrowedOperation> narrowed;
+
+    /// The error of `result` that `BackendResult::origin` is about; null where there is none.
+    [[nodiscard]] static const NumericalError* largest_error(const BackendResult& result);
 };
 
 struct ComparisonOptions {

@@ -4,11 +4,6 @@
 #include <fmt/format.h>
 
 namespace nacre::cpu {
-namespace {
-
-constexpr std::uint64_t largest_shadowed_bytes = std::uint64_t{1} << 30;
-
-}  // namespace
 
 Expected<std::unique_ptr<rhi::BackendBuffer>> CpuBuffer::create(const std::shared_ptr<HostMemory>& memory,
                                                                 const rhi::BufferDesc& desc) {
@@ -20,7 +15,6 @@ Expected<std::unique_ptr<rhi::BackendBuffer>> CpuBuffer::create(const std::share
                                 desc.size, memory->reserved_bytes(), memory->capacity()),
                     "Free other resources or use a smaller buffer.");
     if (memory->shadows) {
-        // Compiled code counts bytes of shadows in 32 bits with a sign.
         if (desc.size > largest_shadowed_bytes)
             return fail(ErrorCode::unsupported, "create buffer", fmt::format("'{}'", desc.name),
                         fmt::format("expected at most {} bytes on a device in double precision, found {}", largest_shadowed_bytes,

@@ -8,6 +8,9 @@
 
 namespace nacre::cpu {
 
+/// Of a buffer on a device in double precision: compiled code counts bytes of shadows in 32 bits with a sign.
+inline constexpr std::uint64_t largest_shadowed_bytes = std::uint64_t{1} << 30;
+
 /// Memory of the host, whatever the kind of memory that was asked for.
 class CpuBuffer : public rhi::BackendBuffer {
   public:

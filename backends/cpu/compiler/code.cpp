@@ -35,6 +35,7 @@
 #include "backends/cpu/images/image_operations.h"
 #include "backends/cpu/rays/ray_query.h"
 #include "backends/cpu/shader_interface.h"
+#include "backends/cpu/trace.h"
 
 namespace nacre::cpu {
 namespace {
@@ -204,6 +205,9 @@ class OrcGenerator final : public CodeGenerator {
         define("nacre_cpu_ray_proceed", ray_proceed_function());
         define("nacre_cpu_ray_confirm", ray_confirm_function());
         define("nacre_cpu_ray_property", ray_property_function());
+        define("nacre_cpu_trace_begin", trace_functions().begin);
+        define("nacre_cpu_trace_event", trace_functions().event);
+        define("nacre_cpu_trace_write", trace_functions().write);
         // What LLVM and the functions in double precision call.
         using One = double (*)(double);
         using Two = double (*)(double, double);

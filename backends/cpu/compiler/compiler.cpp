@@ -34,6 +34,7 @@ class ShaderCompilation final : public Compiler {
         std::vector<NarrowedOperation> narrowed;
         NACRE_TRY(program.code, compile(source, spv::ExecutionModel::GLCompute, {}, narrowed, [&](llvm::Module& target, const Module& module) {
                       ComputeEmitter emitter(target, module, options_, source.slots);
+                      emitter.trace_table = source.trace;
                       emitter.emit();
                       program.workgroup_size = module.workgroup_size;
                       workgroup_bytes = emitter.workgroup_bytes, subgroups = emitter.subgroups, has_barriers = emitter.has_barriers;
@@ -79,6 +80,7 @@ class ShaderCompilation final : public Compiler {
         std::vector<NarrowedOperation> narrowed;
         NACRE_TRY(code, compile(source, spv::ExecutionModel::Fragment, {}, narrowed, [&](llvm::Module& target, const Module& module) {
                       FragmentEmitter emitter(target, module, options_, source.slots);
+                      emitter.trace_table = source.trace;
                       emitter.emit();
                       program = emitter.program;
                       return Emitted{false, emitter.narrowed()};
@@ -134,13 +136,20 @@ class ShaderCompilation final : public Compiler {
             llvm::raw_fd_ostream out(fmt::format("{}/{}.ll", dump, file), problem);
             if (!problem) target->print(out, nullptr);
         }
+        if (source.trace) {
+            source.trace->shader = source.name;
+            for (std::size_t i = 0; i < source.trace->offsets.size(); ++i)
+                source.trace->instructions[i].line = rhi::spirv::source_line(words, source.trace->offsets[i]);
+        }
+        // Code that is traced refers to addresses of this process.
+        const bool use_disk_cache = options_.use_disk_cache && !source.trace;
         const Hash128 key = key_of(words, source, model, input);
         std::vector<std::byte> object;
-        if (options_.use_disk_cache)
+        if (use_disk_cache)
             if (auto found = cache_.load("cpu", key)) object = std::move(*found);
         if (object.empty()) {
             NACRE_TRY(object, generator_->compile(*target, std::string(source.name), emitted.has_coroutines));
-            if (options_.use_disk_cache) cache_.store("cpu", key, object);
+            if (use_disk_cache) cache_.store("cpu", key, object);
         }
         NACRE_TRY(std::shared_ptr<LoadedCode> code, generator_->load(std::move(object), std::string(source.name)));
         return std::shared_ptr<CompiledCode>(std::move(code));

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "backends/cpu/program.h"
+#include "backends/cpu/trace.h"
 #include "core/error.h"
 #include "rhi/pipeline.h"
 #include "rhi/reflection.h"
@@ -49,6 +50,8 @@ struct ShaderSource {
     const rhi::ShaderReflection* reflection = nullptr;
     std::span<const rhi::SpecializationConstant> specialization;
     std::span<const BindingSlots> slots;
+    /// Not null: the program tells what it computes, and this, which it refers to, is filled.
+    TraceTable* trace = nullptr;
 };
 
 /// Vertex input, known when a pipeline is made.

@@ -274,6 +274,7 @@ void Emitter::emit_block(std::uint32_t index, llvm::Value* block_mask) {
         std::vector<Component> components;
         for (llvm::AllocaInst* slot : state.phi_slots[i])
             components.emplace_back(builder.CreateLoad(slot->getAllocatedType(), slot));
+        trace_result(block.phis[i], components);
         define(block.phis[i].result).components = std::move(components);
         finish_definition(block.phis[i].result);
     }

@@ -310,12 +310,16 @@ bool Emitter::emit_image(const Instruction& at) {
     const Type& type = module.type(image.image_type);
     if (type.dim == spv::Dim::Buffer || type.dim == spv::Dim::SubpassData)
         reject("texel buffers and subpass inputs are not supported");
+    std::vector<Component> coordinates = get(at.operand(1)).components;
+    if (operation == ImageOperation::store && trace_table) {
+        trace(at, 0, {at.operand(2)}, get(at.operand(2)).components);
+        trace_image_write(coordinates);
+    }
     if (in_double() && image_integer_flag(image.image_type) == 0) {
         emit_double_image(at, {operation, is_projected, is_compared, is_implicit, first_operand});
         return true;
     }
     const std::uint32_t dimensions = dimensions_of(type.dim);
-    std::vector<Component> coordinates = get(at.operand(1)).components;
     const ImageOperands more = operands_from(at, first_operand);
     std::uint32_t flags = static_cast<std::uint32_t>(operation) | image_integer_flag(image.image_type);
     // Only fragment shaders have neighbors to take differences from; elsewhere the base level is read.

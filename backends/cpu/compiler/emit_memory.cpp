@@ -626,7 +626,12 @@ bool Emitter::emit_memory(const Instruction& at) {
             set(at, load(*from.pointer));
             return true;
         }
-        case Op::OpStore: store(*get(at.operand(0)).pointer, get(at.operand(1)).components); return true;
+        case Op::OpStore: {
+            const std::vector<Component> values = get(at.operand(1)).components;
+            if (trace_table) trace(at, trace_root(at.operand(0)), {at.operand(1)}, values);
+            store(*get(at.operand(0)).pointer, values);
+            return true;
+        }
         case Op::OpCopyMemory: store(*get(at.operand(0)).pointer, load(*get(at.operand(1)).pointer)); return true;
         case Op::OpArrayLength: {
             // Of the last member of the block that the pointer leads to.

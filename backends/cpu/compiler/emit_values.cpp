@@ -108,6 +108,7 @@ void Emitter::set(const Instruction& at, std::vector<Component> components) {
     if (!uniformity.is_divergent(at.result))
         for (Component& component : components)
             if (!component.is_uniform()) component = Component(narrow(component, mask));
+    trace_result(at, components);
     define(at.result).components = std::move(components);
     finish_definition(at.result);
 }

@@ -16,6 +16,7 @@
 #include "backends/cpu/compiler/math/math.h"
 #include "backends/cpu/compiler/module.h"
 #include "backends/cpu/compiler/uniformity.h"
+#include "backends/cpu/trace.h"
 
 /// @file
 /// From SPIR-V to LLVM IR that runs `lanes` invocations at once.
@@ -121,6 +122,8 @@ class Emitter {
   public:
     Emitter(llvm::Module& target, const Module& module, const CompilerOptions& options, std::span<const BindingSlots> slots);
     virtual ~Emitter() = default;
+    /// Set before the emission of a program that tells what it computes, and filled by it.
+    TraceTable* trace_table = nullptr;
     /// Instructions that went through single precision on a device in double precision: offset in the module and what they do.
     [[nodiscard]] const std::map<std::uint32_t, std::string>& narrowed() const { return narrowed_; }
     Emitter(const Emitter&) = delete;
@@ -143,6 +146,14 @@ class Emitter {
     Component of_bits(const Component& bits, const Type& scalar);
     /// Lists the current instruction among those that go through single precision.
     void note_narrowed(const char* operation);
+    // Traces (emit_trace.cpp); nothing without a trace_table.
+    /// The invocation begins; `is_traced` has the lane of the traced one. `ids`: of each lane, for compute shaders.
+    void begin_trace(llvm::Value* is_traced, std::vector<Component> ids);
+    void trace(const Instruction& at, Id result, std::vector<Id> operands, const std::vector<Component>& values);
+    void trace_result(const Instruction& at, const std::vector<Component>& values);
+    void trace_image_write(const std::vector<Component>& coordinates);
+    /// The variable behind a chain of accesses; the pointer itself where there is none.
+    [[nodiscard]] Id trace_root(Id pointer) const;
     [[nodiscard]] bool has_shadow(const Pointer& pointer, const Type& scalar) const;
     /// The doubles of the words that a pointer leads to.
     Pointer shadow_of(const Pointer& pointer);
@@ -303,6 +314,8 @@ class Emitter {
     std::unordered_map<Id, llvm::AllocaInst*> ray_queries;
     std::uint64_t workgroup_variable_bytes = 0;
     bool has_side_effects = false;             ///< Some store, atomic or image store was emitted.
+    llvm::AllocaInst* trace_lane = nullptr;
+    std::vector<Component> invocation_ids;     ///< Compute shaders that are traced.
     std::int64_t workgroup_shadow_offset = 0;  ///< Of the doubles of workgroup variables, in their memory.
 
     /// One activation of a function.

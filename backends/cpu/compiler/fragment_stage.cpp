@@ -327,6 +327,8 @@ void FragmentEmitter::emit_batch() {
     llvm::Value* y = corner(offsetof(FragmentBatch, y));
     std::vector<std::uint32_t> step_x(lanes), step_y(lanes);
     for (std::uint32_t i = 0; i < lanes; ++i) step_x[i] = i & 1, step_y[i] = i >> 1 & 1;
+    llvm::Value* const corner_x = x;
+    llvm::Value* const corner_y = y;
     pixel_x = builder.CreateSIToFP(builder.CreateAdd(x, llvm::ConstantDataVector::get(context, step_x)), vector_of(real_type()));
     pixel_y = builder.CreateSIToFP(builder.CreateAdd(y, llvm::ConstantDataVector::get(context, step_y)), vector_of(real_type()));
     declare_inputs();
@@ -348,6 +350,15 @@ void FragmentEmitter::emit_batch() {
     llvm::Value* live_bits = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, live)), llvm::Align(4));
     store_live(builder.CreateBitCast(builder.CreateTrunc(live_bits, builder.getIntNTy(lanes)), mask_type));
     mask = all_lanes();
+    if (trace_table) {
+        llvm::Value* wanted = load_context(offsetof(ShaderContext, trace), pointer_type);
+        const auto is_at = [&](llvm::Value* corner_of, const std::vector<std::uint32_t>& step, std::size_t axis) {
+            llvm::Value* coordinate =
+                invariant_load(builder.getInt32Ty(), at_offset(wanted, static_cast<std::int64_t>(offsetof(ShaderTrace, invocation) + 4 * axis)), 4);
+            return builder.CreateICmpEQ(builder.CreateAdd(corner_of, llvm::ConstantDataVector::get(context, step)), splat(coordinate));
+        };
+        begin_trace(builder.CreateAnd(live(), builder.CreateAnd(is_at(corner_x, step_x, 0), is_at(corner_y, step_y, 1))), {});
+    }
     declare_variables();
     emit_function(module.entry(), {}, all_lanes());
     mask = all_lanes();

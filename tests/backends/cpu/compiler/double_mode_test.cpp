@@ -380,7 +380,8 @@ TEST(DoubleMode, VerticesThatShadersWroteKeepTheirDoubles) {
     const Buffer vertices = bench.storage(3 * 16);
     bench.dispatch(prelude +
                        "layout(set = 0, binding = 0) buffer Vertices { vec4 vertices[]; };\n"
-                       "void main() { if (at < 3u) vertices[at] = vec4(at == 1u ? 3.0 : -1.0, at == 2u ? 3.0 : -1.0, 1.0 / 3.0, 1.0 / 7.0); }\n",
+                       // Constant expressions are computed in single precision, long before any device sees them.
+                       "void main() { float zero = float(gl_NumWorkGroups.x - 1u); if (at < 3u) vertices[at] = vec4(at == 1u ? 3.0 : -1.0, at == 2u ? 3.0 : -1.0, 1.0 / (3.0 + zero), 1.0 / (7.0 + zero)); }\n",
                    {{.binding = 0, .buffer = vertices}});
     Picture picture(bench);
     GraphicsPipelineDesc desc;
@@ -409,7 +410,7 @@ TEST(DoubleMode, BlendingAddsDoublesWhateverTheFormat) {
                                    .blend = {.enabled = true, .source_color = BlendFactor::source_alpha, .destination_color = BlendFactor::one},
                                    .write_mask = 7}};
             picture.draw(desc, "void main() { gl_Position = vec4(gl_VertexIndex == 1 ? 3.0 : -1.0, gl_VertexIndex == 2 ? 3.0 : -1.0, 0.0, 1.0); }\n",
-                         "layout(location = 0) out vec4 color; void main() { color = vec4(1.0 / 3.0, gl_FragCoord.x / 300.0, 0.0, 0.1); }\n", 7);
+                         "layout(location = 0) out vec4 color; void main() { color = vec4(1.0 / (3.0 + gl_FragCoord.z), gl_FragCoord.x / 300.0, 0.0, 0.1); }\n", 7);
             const auto found = picture.texels();
             for (std::size_t x = 0; x < 16; ++x) {
                 EXPECT_NEAR(found[4 * x], 7.0 / 3 * static_cast<double>(0.1f), 1e-14) << rhi::info(format).name << " " << samples;
