@@ -140,30 +140,29 @@ std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& referen
             if (pair.event < event) latest = &pair;
         return latest;
     };
-    Pair at = *last;
-    std::size_t event = last_event;
-    double brought = 0.0;
+    // From what was stored last back along the operands that bring most of the error.
+    Pair at = *last, worst = *last;
+    std::size_t event = last_event, worst_event = last_event;
+    double growth = -1.0;
     for (;;) {
         const rhi::TracedInstruction& instruction = instructions[test.events[event].instruction];
         const bool is_absolute = takes_over_absolute_errors(instruction.operation) || !instruction.is_floating;
         const Pair* largest = nullptr;
-        double most = -1.0;
-        brought = 0.0;
+        double most = -1.0, brought = 0.0;
         for (const std::uint32_t operand : instruction.operands) {
             const Pair* pair = before(operand, event);
             if (!pair || pair->error == 0.0) continue;
-            const double contribution = is_absolute ? pair->error : pair->relative() * at.magnitude;
             brought = std::max(brought, pair->relative());
+            const double contribution = is_absolute ? pair->error : pair->relative();
             if (contribution > most) most = contribution, largest = pair;
         }
-        // Integers have no small errors: whatever differs comes from what differs.
-        if (!largest || (instruction.is_floating && most < 0.5 * at.error)) break;
+        if (at.relative() - brought > growth) growth = at.relative() - brought, worst = at, worst_event = event;
+        if (!largest) break;
         at = *largest;
         event = at.event;
     }
-    const rhi::TracedInstruction& instruction = instructions[test.events[event].instruction];
-    ErrorOrigin origin{test.shader, instruction.line, instruction.operation, at.reference, at.value,
-                       std::max(at.relative() - brought, 0.0), {}};
+    const rhi::TracedInstruction& instruction = instructions[test.events[worst_event].instruction];
+    ErrorOrigin origin{test.shader, instruction.line, instruction.operation, worst.reference, worst.value, std::max(growth, 0.0), {}};
     const bool is_read = instruction.operation.starts_with("Image") || instruction.operation == "Load";
     origin.text = fmt::format("{} ({}){}: {:.9g}, not {:.9g}; the relative error grows by {:.2g} here",
                               origin.line.empty() ? origin.shader : origin.line, origin.operation,

@@ -54,9 +54,10 @@ struct ErrorOrigin {
     std::string text;          ///< One sentence for people.
 };
 
-/// Follows an error from what an invocation stored last back to where it begins: from each result to the operand that brings
-/// most of its error, until no operand brings half of it. Sums and differences take over absolute errors, all others relative
-/// ones. Nothing where both computed the same. Both traces are of one invocation of one shader.
+/// Follows an error from what an invocation stored last back to what came in, from each result to the operand that brings most
+/// of it (sums and differences take over absolute errors, all others relative ones), and gives the instruction on this way at
+/// which the relative error grows most: from the largest of its operands to its result. Nothing where both computed the same.
+/// Both traces are of one invocation of one shader.
 std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& reference, const rhi::InvocationTrace& test);
 
 }  // namespace nacre::measure
