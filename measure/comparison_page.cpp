@@ -99,23 +99,26 @@ ReportTable texture_table(const BackendResult& result, const std::string& refere
 }
 
 ReportTable error_table(const BackendResult& result) {
-    ReportTable table{
-        .title = fmt::format("Numerical error of {}", result.backend),
-        .note = "Against the reference in double precision. Textures of floats are compared with the reference's doubles, packed "
-                "words by their decoded fields.",
-        .columns = {"texture", "largest error", "of the largest value", "relative", "RMS", "pixel", "field", "double", "single"},
-        .is_folded = false};
+    ReportTable table{.title = fmt::format("Numerical error of {}", result.backend),
+                      .note =
+                          "Against the reference in double precision. Textures of floats are compared with the "
+                          "reference's doubles, packed "
+                          "words by their decoded fields.",
+                      .columns = {"texture", "largest error", "of the largest value", "relative", "RMS", "pixel",
+                                  "field", "double", "single"},
+                      .is_folded = false};
     for (const NumericalError& error : result.errors) {
         const WrongValue& at = error.largest;
-        table.rows.push_back({text_cell(error.texture), number_cell(fmt::format("{:.3g}", at.error)),
-                              number_cell(fmt::format("{:.3g}", error.share())), number_cell(fmt::format("{:.3g}", error.max_rel)),
-                              number_cell(fmt::format("{:.3g}", error.rms)),
-                              text_cell(fmt::format("{}, {} (layer {}, mip {})", at.x, at.y, at.layer, at.mip)), text_cell(at.name),
-                              number_cell(fmt::format("{:.9g}", at.reference)), number_cell(fmt::format("{:.9g}", at.value))});
+        table.rows.push_back(
+            {text_cell(error.texture), number_cell(fmt::format("{:.3g}", at.error)),
+             number_cell(fmt::format("{:.3g}", error.share())), number_cell(fmt::format("{:.3g}", error.max_rel)),
+             number_cell(fmt::format("{:.3g}", error.rms)),
+             text_cell(fmt::format("{}, {} (layer {}, mip {})", at.x, at.y, at.layer, at.mip)), text_cell(at.name),
+             number_cell(fmt::format("{:.9g}", at.reference)), number_cell(fmt::format("{:.9g}", at.value))});
     }
     if (const NumericalError* const largest = SceneComparison::largest_error(result))
-        table.note += fmt::format(" The largest is that of {} at pixel {}, {}. {}", largest->texture, largest->largest.x,
-                                  largest->largest.y,
+        table.note += fmt::format(" The largest is that of {} at pixel {}, {}. {}", largest->texture,
+                                  largest->largest.x, largest->largest.y,
                                   result.origin ? "It begins at " + result.origin->text + "."
                                                 : "Where it begins could not be told: " + result.no_origin);
     return table;

@@ -67,11 +67,13 @@ Error named(Error error, const std::string& backend) {
 }
 
 bool is_more_precise(const Contestant& reference, const Contestant& test) {
-    return reference.device && test.device && reference.device->capabilities().float_bits > test.device->capabilities().float_bits;
+    return reference.device && test.device &&
+           reference.device->capabilities().float_bits > test.device->capabilities().float_bits;
 }
 
 // What the invocation that made a texel computed on one device; the last pass that writes the texture counts.
-Expected<rhi::InvocationTrace> trace_texel(const Contestant& contestant, const std::string& pass, const WrongValue& texel) {
+Expected<rhi::InvocationTrace> trace_texel(const Contestant& contestant, const std::string& pass,
+                                           const WrongValue& texel) {
     rhi::TraceRequest request{.shader = pass, .x = texel.x, .y = texel.y, .z = texel.layer};
     const auto run = [&]() -> Expected<rhi::Trace> {
         NACRE_CHECK(contestant.device->start_trace(request));
@@ -107,12 +109,14 @@ void find_origin(const Contestant& reference, const Contestant& test, BackendRes
         return;
     }
     if (from->shader != to->shader) {
-        result.no_origin = fmt::format("'{}' made the texel in double precision, '{}' in single precision", from->shader, to->shader);
+        result.no_origin =
+            fmt::format("'{}' made the texel in double precision, '{}' in single precision", from->shader, to->shader);
         return;
     }
     result.origin = find_error_origin(*from, *to);
     if (!result.origin)
-        result.no_origin = fmt::format("both precisions compute the same in '{}' up to where they part: another surface is seen", to->shader);
+        result.no_origin = fmt::format(
+            "both precisions compute the same in '{}' up to where they part: another surface is seen", to->shader);
 }
 
 // All layers and mips of one texture on two devices.
@@ -137,7 +141,8 @@ Expected<TextureDifference> compare_texture(const Contestant& reference, const C
                 // Packed words have no more than their bits.
                 std::vector<double> exact;
                 if (data_a.fields.empty() && !rhi::info(data_a.format).is_integer())
-                    if (auto values = reference.renderer.read_exact_intermediate(description.name, layer, mip)) exact = *std::move(values);
+                    if (auto values = reference.renderer.read_exact_intermediate(description.name, layer, mip))
+                        exact = *std::move(values);
                 NACRE_CHECK(add_numerical_error(data_a, data_b, exact, layer, mip, error));
             }
             if (with_pictures && part.differing > 0 && !pictures && data_a.format == data_b.format) {
@@ -309,18 +314,26 @@ std::string to_json(const SceneComparison& comparison) {
         }
         Json errors = Json::array();
         const auto error_json = [](const NumericalError& error) {
-            return Json{{"texture", error.texture}, {"values", error.values}, {"exact", error.is_exact},
-                        {"max_abs", finite(error.largest.error)}, {"max_rel", finite(error.max_rel)}, {"rms", finite(error.rms)},
-                        {"share", finite(error.share())}, {"pixel", {error.largest.x, error.largest.y}},
-                        {"layer", error.largest.layer}, {"mip", error.largest.mip}, {"field", error.largest.name},
-                        {"reference", finite(error.largest.reference)}, {"value", finite(error.largest.value)}};
+            return Json{{"texture", error.texture},
+                        {"values", error.values},
+                        {"exact", error.is_exact},
+                        {"max_abs", finite(error.largest.error)},
+                        {"max_rel", finite(error.max_rel)},
+                        {"rms", finite(error.rms)},
+                        {"share", finite(error.share())},
+                        {"pixel", {error.largest.x, error.largest.y}},
+                        {"layer", error.largest.layer},
+                        {"mip", error.largest.mip},
+                        {"field", error.largest.name},
+                        {"reference", finite(error.largest.reference)},
+                        {"value", finite(error.largest.value)}};
         };
         for (const NumericalError& error : result.errors) errors.push_back(error_json(error));
         Json origin = nullptr;
         if (result.origin)
-            origin = Json{{"shader", result.origin->shader}, {"line", result.origin->line}, {"operation", result.origin->operation},
-                          {"reference", finite(result.origin->reference)}, {"value", finite(result.origin->value)},
-                          {"growth", finite(result.origin->growth)}};
+            origin = Json{{"shader", result.origin->shader},       {"line", result.origin->line},
+                          {"operation", result.origin->operation}, {"reference", finite(result.origin->reference)},
+                          {"value", finite(result.origin->value)}, {"growth", finite(result.origin->growth)}};
         const NumericalError* const largest = SceneComparison::largest_error(result);
         results.push_back(Json{{"backend", result.backend},
                                {"textures", std::move(textures)},
@@ -335,7 +348,8 @@ std::string to_json(const SceneComparison& comparison) {
     }
     Json narrowed = Json::array();
     for (const rhi::NarrowedOperation& operation : comparison.narrowed)
-        narrowed.push_back(Json{{"shader", operation.shader}, {"line", operation.line}, {"operation", operation.operation}});
+        narrowed.push_back(
+            Json{{"shader", operation.shader}, {"line", operation.line}, {"operation", operation.operation}});
     return Json{{"scene", comparison.scene},
                 {"narrowed", std::move(narrowed)},
                 {"reference", comparison.backends.empty() ? "" : comparison.backends.front().backend},

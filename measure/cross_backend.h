@@ -55,11 +55,11 @@ struct BackendResult {
     std::vector<std::string> missing;          ///< Textures of the reference that this backend lacks.
     std::vector<std::string> added;            ///< Textures that the reference lacks.
     PictureDifference final;
-    /// Where the reference is in double precision (Capabilities::float_bits) and this backend is not: of every texture of
-    /// numbers in `textures`, and where the largest of them begins.
+    /// Where the reference is in double precision (Capabilities::float_bits) and this backend is not: of every texture
+    /// of numbers in `textures`, and where the largest of them begins.
     std::vector<NumericalError> errors;
     std::optional<ErrorOrigin> origin;
-    std::string no_origin;                     ///< Why there is none.
+    std::string no_origin;  ///< Why there is none.
     std::vector<TexturePictures> texture_pictures;
 };
 

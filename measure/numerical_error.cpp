@@ -54,17 +54,19 @@ Pair pair_of(const rhi::TraceEvent& reference, const rhi::TraceEvent& test, std:
     for (std::size_t i = 0; i < reference.values.size() && i < test.values.size(); ++i) {
         const double a = reference.values[i], b = test.values[i];
         const double error = a == b || (std::isnan(a) && std::isnan(b)) ? 0.0
-                             : std::isfinite(a - b)                      ? std::abs(a - b)
+                             : std::isfinite(a - b)                     ? std::abs(a - b)
                                                                         : std::numeric_limits<double>::max();
-        pair.magnitude = std::max(pair.magnitude, std::max(std::isfinite(a) ? std::abs(a) : 0.0, std::isfinite(b) ? std::abs(b) : 0.0));
+        pair.magnitude = std::max(pair.magnitude,
+                                  std::max(std::isfinite(a) ? std::abs(a) : 0.0, std::isfinite(b) ? std::abs(b) : 0.0));
         if (error > pair.error || i == 0) pair.error = std::max(error, pair.error), pair.reference = a, pair.value = b;
     }
     return pair;
 }
 
 bool takes_over_absolute_errors(const std::string& operation) {
-    for (const char* name : {"FAdd", "FSub", "FNegate", "Store", "Load", "Phi", "Select", "CompositeConstruct", "CompositeExtract",
-                             "CompositeInsert", "VectorShuffle", "CopyObject", "ImageWrite", "MatrixTimesVector", "Dot"})
+    for (const char* name :
+         {"FAdd", "FSub", "FNegate", "Store", "Load", "Phi", "Select", "CompositeConstruct", "CompositeExtract",
+          "CompositeInsert", "VectorShuffle", "CopyObject", "ImageWrite", "MatrixTimesVector", "Dot"})
         if (operation == name) return true;
     return false;
 }
@@ -84,7 +86,8 @@ Expected<void> add_numerical_error(const TextureData& reference, const TextureDa
         return value;
     };
     for (std::uint64_t index = 0; index < reference.texels(); ++index) {
-        const auto x = static_cast<std::uint32_t>(index % reference.width), y = static_cast<std::uint32_t>(index / reference.width);
+        const auto x = static_cast<std::uint32_t>(index % reference.width),
+                   y = static_cast<std::uint32_t>(index / reference.width);
         if (!reference.fields.empty()) {
             for (const BitField& field : reference.fields) {
                 if (field.kind == FieldKind::uint) continue;
@@ -162,7 +165,8 @@ std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& referen
         event = at.event;
     }
     const rhi::TracedInstruction& instruction = instructions[test.events[worst_event].instruction];
-    ErrorOrigin origin{test.shader, instruction.line, instruction.operation, worst.reference, worst.value, std::max(growth, 0.0), {}};
+    ErrorOrigin origin{
+        test.shader, instruction.line, instruction.operation, worst.reference, worst.value, std::max(growth, 0.0), {}};
     const bool is_read = instruction.operation.starts_with("Image") || instruction.operation == "Load";
     origin.text = fmt::format("{} ({}){}: {:.9g}, not {:.9g}; the relative error grows by {:.2g} here",
                               origin.line.empty() ? origin.shader : origin.line, origin.operation,

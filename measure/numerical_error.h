@@ -12,8 +12,8 @@
 #include "rhi/trace.h"
 
 /// @file
-/// How wrong single precision is: textures of a device in single precision against those of one in double precision, and the
-/// line of GLSL at which the largest error begins.
+/// How wrong single precision is: textures of a device in single precision against those of one in double precision,
+/// and the line of GLSL at which the largest error begins.
 
 namespace nacre::measure {
 
@@ -23,18 +23,18 @@ struct WrongValue {
     std::string name;        ///< Field of a packed word, or channel: "r".
     double reference = 0.0;  ///< In double precision.
     double value = 0.0;
-    double error = 0.0;      ///< |value - reference| (radians for octahedral fields, turns for circular ones).
+    double error = 0.0;  ///< |value - reference| (radians for octahedral fields, turns for circular ones).
 };
 
 /// The error of all numbers of a texture. Identifiers and flags are no numbers and left out.
 struct NumericalError {
     std::string texture;
-    bool is_exact = false;      ///< The reference was read in doubles; otherwise its values were rounded by their format.
-    std::uint64_t values = 0;   ///< Compared.
-    double largest_value = 0.0; ///< Magnitude, of the reference.
+    bool is_exact = false;  ///< The reference was read in doubles; otherwise its values were rounded by their format.
+    std::uint64_t values = 0;    ///< Compared.
+    double largest_value = 0.0;  ///< Magnitude, of the reference.
     double rms = 0.0;
-    double max_rel = 0.0;       ///< Largest |value - reference| / max(|value|, |reference|).
-    WrongValue largest;         ///< By its absolute error; all zero where there is no error.
+    double max_rel = 0.0;  ///< Largest |value - reference| / max(|value|, |reference|).
+    WrongValue largest;    ///< By its absolute error; all zero where there is no error.
     /// The largest error as a part of the largest value: what textures are ranked by.
     [[nodiscard]] double share() const { return largest_value > 0.0 ? largest.error / largest_value : 0.0; }
 };
@@ -47,17 +47,17 @@ Expected<void> add_numerical_error(const TextureData& reference, const TextureDa
 
 /// Where an error begins.
 struct ErrorOrigin {
-    std::string shader, line;  ///< "file:line"; empty where the module does not know it.
-    std::string operation;     ///< "FSub", "ImageFetch", ...
+    std::string shader, line;             ///< "file:line"; empty where the module does not know it.
+    std::string operation;                ///< "FSub", "ImageFetch", ...
     double reference = 0.0, value = 0.0;  ///< The instruction's result in double and in single precision.
-    double growth = 0.0;       ///< Relative error of the result less the largest of its operands.
-    std::string text;          ///< One sentence for people.
+    double growth = 0.0;                  ///< Relative error of the result less the largest of its operands.
+    std::string text;                     ///< One sentence for people.
 };
 
-/// Follows an error from what an invocation stored last back to what came in, from each result to the operand that brings most
-/// of it (sums and differences take over absolute errors, all others relative ones), and gives the instruction on this way at
-/// which the relative error grows most: from the largest of its operands to its result. Nothing where both computed the same.
-/// Both traces are of one invocation of one shader.
+/// Follows an error from what an invocation stored last back to what came in, from each result to the operand that
+/// brings most of it (sums and differences take over absolute errors, all others relative ones), and gives the
+/// instruction on this way at which the relative error grows most: from the largest of its operands to its result.
+/// Nothing where both computed the same. Both traces are of one invocation of one shader.
 std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& reference, const rhi::InvocationTrace& test);
 
 }  // namespace nacre::measure

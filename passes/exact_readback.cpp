@@ -39,15 +39,17 @@ class Temporary {
 
 }  // namespace
 
-Expected<std::vector<double>> read_exactly(rhi::Device& device, rhi::Texture texture, std::uint32_t mip, std::uint32_t layer) {
+Expected<std::vector<double>> read_exactly(rhi::Device& device, rhi::Texture texture, std::uint32_t mip,
+                                           std::uint32_t layer) {
     if (!device.capabilities().shader_float64)
-        return fail(ErrorCode::unsupported, "read texture in double precision", device.adapter().name, "its shaders have no float64",
-                    "Read the bits of the texture.");
+        return fail(ErrorCode::unsupported, "read texture in double precision", device.adapter().name,
+                    "its shaders have no float64", "Read the bits of the texture.");
     NACRE_TRY(const rhi::TextureDesc desc, device.describe(texture));
     const rhi::Extent3D extent = rhi::mip_extent(desc, mip);
     const std::uint64_t texels = std::uint64_t{extent.width} * extent.height;
     rhi::ShaderCompiler compiler({});
-    NACRE_TRY(const rhi::ShaderDesc compiled, compiler.compile({.path = "passes/exact_readback.comp", .text = shader_text}));
+    NACRE_TRY(const rhi::ShaderDesc compiled,
+              compiler.compile({.path = "passes/exact_readback.comp", .text = shader_text}));
     NACRE_TRY(const rhi::Shader made_shader, device.create_shader(compiled));
     const Temporary<rhi::Shader> shader(device, made_shader);
     NACRE_TRY(const rhi::ComputePipeline made_pipeline,
@@ -60,10 +62,11 @@ Expected<std::vector<double>> read_exactly(rhi::Device& device, rhi::Texture tex
     const Temporary<rhi::Buffer> result(device, made_buffer);
     NACRE_TRY(const rhi::BindGroupLayout layout, device.bind_group_layout(made_pipeline, 0));
     NACRE_TRY(const rhi::BindGroup made_group,
-              device.create_bind_group({.layout = layout,
-                                        .entries = {{.binding = 0, .buffer = result},
-                                                    {.binding = 1, .texture = rhi::TextureView::subresource(texture, mip, layer)}},
-                                        .name = "exact_readback"}));
+              device.create_bind_group(
+                  {.layout = layout,
+                   .entries = {{.binding = 0, .buffer = result},
+                               {.binding = 1, .texture = rhi::TextureView::subresource(texture, mip, layer)}},
+                   .name = "exact_readback"}));
     const Temporary<rhi::BindGroup> group(device, made_group);
     rhi::CommandList list = device.create_command_list("exact_readback");
     list.set_pipeline(pipeline);

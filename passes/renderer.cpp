@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "passes/renderer.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <glm/gtc/packing.hpp>
 
 #include "core/srgb.h"
@@ -657,7 +658,8 @@ Expected<rhi::Texture> Renderer::find_intermediate(std::string_view name, std::u
     return node->handle;
 }
 
-Expected<IntermediateContent> Renderer::read_intermediate(std::string_view name, std::uint32_t layer, std::uint32_t mip) {
+Expected<IntermediateContent> Renderer::read_intermediate(std::string_view name, std::uint32_t layer,
+                                                          std::uint32_t mip) {
     IntermediateContent content;
     NACRE_TRY(const rhi::Texture texture, find_intermediate(name, layer, mip, content.description));
     content.width = std::max(content.description.width >> mip, 1u);
@@ -666,7 +668,8 @@ Expected<IntermediateContent> Renderer::read_intermediate(std::string_view name,
     return content;
 }
 
-Expected<std::vector<double>> Renderer::read_exact_intermediate(std::string_view name, std::uint32_t layer, std::uint32_t mip) {
+Expected<std::vector<double>> Renderer::read_exact_intermediate(std::string_view name, std::uint32_t layer,
+                                                                std::uint32_t mip) {
     IntermediateDescription description;
     NACRE_TRY(const rhi::Texture texture, find_intermediate(name, layer, mip, description));
     return read_exactly(state_->device, texture, mip, layer);

@@ -139,9 +139,10 @@ class Renderer {
     Expected<IntermediateContent> read_intermediate(std::string_view name, std::uint32_t layer = 0,
                                                     std::uint32_t mip = 0);
 
-    /// Four doubles for each texel of an intermediate texture of floats or fixed-point numbers, with all the precision that
-    /// the device has (see exact_readback.h). Errors: those of `read_intermediate`, and unsupported.
-    Expected<std::vector<double>> read_exact_intermediate(std::string_view name, std::uint32_t layer = 0, std::uint32_t mip = 0);
+    /// Four doubles for each texel of an intermediate texture of floats or fixed-point numbers, with all the precision
+    /// that the device has (see exact_readback.h). Errors: those of `read_intermediate`, and unsupported.
+    Expected<std::vector<double>> read_exact_intermediate(std::string_view name, std::uint32_t layer = 0,
+                                                          std::uint32_t mip = 0);
 
     [[nodiscard]] const Plan& plan() const;
     [[nodiscard]] std::string graph_as_dot() const;

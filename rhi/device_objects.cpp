@@ -212,8 +212,8 @@ Expected<QueryPool> Device::create_query_pool(const QueryPoolDesc& desc) {
 }
 
 Expected<void> BackendDevice::start_trace(const TraceRequest& request) {
-    return fail(ErrorCode::unsupported, "trace shaders", fmt::format("'{}'", request.shader), "this backend cannot look into its shaders",
-                "Use backend cpu.");
+    return fail(ErrorCode::unsupported, "trace shaders", fmt::format("'{}'", request.shader),
+                "this backend cannot look into its shaders", "Use backend cpu.");
 }
 
 Expected<Trace> BackendDevice::finish_trace() { return Trace{}; }

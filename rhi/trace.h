@@ -54,8 +54,8 @@ struct InvocationTrace {
 };
 
 struct Trace {
-    std::vector<InvocationTrace> invocations;              ///< In the order in which they began.
-    std::vector<std::array<std::uint32_t, 3>> writers;     ///< Invocations of compute shaders that wrote the texel.
+    std::vector<InvocationTrace> invocations;           ///< In the order in which they began.
+    std::vector<std::array<std::uint32_t, 3>> writers;  ///< Invocations of compute shaders that wrote the texel.
 };
 
 }  // namespace nacre::rhi

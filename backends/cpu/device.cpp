@@ -239,7 +239,8 @@ rhi::MemoryStatistics CpuDevice::memory_statistics() const {
 
 void CpuDevice::note_narrowed(const std::string& shader, std::span<const NarrowedOperation> operations) {
     const std::scoped_lock lock(narrowed_mutex_);
-    for (const NarrowedOperation& operation : operations) narrowed_.insert({shader, operation.line, operation.operation});
+    for (const NarrowedOperation& operation : operations)
+        narrowed_.insert({shader, operation.line, operation.operation});
 }
 
 std::vector<rhi::NarrowedOperation> CpuDevice::narrowed_operations() const {

@@ -21,8 +21,8 @@ ShaderSource source_of(const rhi::BackendShader& shader, std::span<const rhi::Sp
 
 KeptShader kept(const rhi::BackendShader& shader, std::span<const rhi::SpecializationConstant> constants,
                 std::span<const BindingSlots> slots) {
-    return {{shader.spirv.begin(), shader.spirv.end()}, shader.entry_point, shader.name, {constants.begin(), constants.end()},
-            {slots.begin(), slots.end()}, {}};
+    return {{shader.spirv.begin(), shader.spirv.end()}, shader.entry_point,           shader.name,
+            {constants.begin(), constants.end()},       {slots.begin(), slots.end()}, {}};
 }
 
 std::unexpected<Error> out_of_memory(const std::string& name) {
@@ -44,7 +44,12 @@ Expected<std::unique_ptr<rhi::BackendComputePipeline>> CpuComputePipeline::creat
 }
 
 ShaderSource KeptShader::source(TraceTable* trace) const {
-    return {.spirv = spirv, .entry_point = entry_point, .name = name, .specialization = constants, .slots = slots, .trace = trace};
+    return {.spirv = spirv,
+            .entry_point = entry_point,
+            .name = name,
+            .specialization = constants,
+            .slots = slots,
+            .trace = trace};
 }
 
 const ComputeProgram* CpuComputePipeline::traced(Compiler& compiler) {

@@ -76,7 +76,7 @@ struct FragmentProgram {
     bool has_side_effects = false;    ///< Stores to buffers or images: runs after early tests only where `early_tests` says so.
     bool runs_per_sample = false;     ///< Reads gl_SampleID, gl_SamplePosition or an input declared `sample`.
     bool uses_centroid = false;
-    bool in_double = false;           ///< Reads the primitive's DoublePrimitive and also writes FragmentBatch::doubles.
+    bool in_double = false;  ///< Reads the primitive's DoublePrimitive and also writes FragmentBatch::doubles.
     std::vector<NarrowedOperation> narrowed;
     std::string name;
     std::shared_ptr<CompiledCode> code;

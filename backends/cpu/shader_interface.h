@@ -33,7 +33,8 @@ struct Descriptor {
     const ImageView* image;       ///< Textures and images.
     union {
         const SamplerState* sampler;  ///< Samplers and combined texture samplers.
-        /// Buffers of devices in double precision: the double of each 32-bit word of the range, at twice the word's offset.
+        /// Buffers of devices in double precision: the double of each 32-bit word of the range, at twice the word's
+        /// offset.
         std::byte* shadow;
     };
 };
@@ -51,7 +52,7 @@ struct ShaderContext {
     std::uint32_t group_sizes[max_groups];  ///< Descriptors in each group (bounds unbounded arrays).
     const std::byte* push_constants;        ///< `push_constant_capacity` bytes, aligned to 16.
     ExecutionState* state;
-    ShaderTrace* trace;                     ///< Of programs that are traced.
+    ShaderTrace* trace;  ///< Of programs that are traced.
 };
 
 // ---- Compute -------------------------------------------------------------------------------------------------------------
@@ -130,12 +131,14 @@ static_assert(sizeof(PrimitiveData) == 64);
 struct DoublePlane {
     double c, dx, dy;
 };
-/// What fragment code of devices in double precision reads besides, at `double_primitive_offset` behind the PrimitiveData.
+/// What fragment code of devices in double precision reads besides, at `double_primitive_offset` behind the
+/// PrimitiveData.
 struct alignas(16) DoublePrimitive {
     double x0, y0;
     double point_x, point_y, inverse_point_size;
     double reserved;
-    DoublePlane planes[2];  ///< Depth and 1 / w, followed by one for each FragmentProgram::inputs (of flat integers: nothing).
+    DoublePlane
+        planes[2];  ///< Depth and 1 / w, followed by one for each FragmentProgram::inputs (of flat integers: nothing).
     [[nodiscard]] DoublePlane* varyings() { return planes + 2; }
 };
 static_assert(sizeof(DoublePrimitive) == 96);
@@ -161,7 +164,7 @@ struct FragmentBatch {
     std::uint32_t sample_index;  ///< gl_SampleID, where the program runs for each sample.
     /// Where inside of the pixel the shader runs: (0.5, 0.5), or the sample's place where it runs for each sample.
     float sample_x, sample_y;
-    FragmentDoubles* doubles;    ///< In double precision, else null.
+    FragmentDoubles* doubles;                              ///< In double precision, else null.
     alignas(64) std::uint32_t sample_mask_in[max_lanes];   ///< gl_SampleMaskIn: covered samples.
     alignas(64) float centroid_x[max_lanes];               ///< Place inside of the pixel for centroid inputs; set where
     alignas(64) float centroid_y[max_lanes];               ///< FragmentProgram::uses_centroid.
@@ -221,8 +224,8 @@ struct ImageArguments {
     alignas(64) std::uint32_t result[4][max_lanes];       ///< Zero in lanes that are not live.
 };
 
-/// The same for devices in double precision and images of floats. Integer coordinates are given as doubles, which hold them
-/// exactly.
+/// The same for devices in double precision and images of floats. Integer coordinates are given as doubles, which hold
+/// them exactly.
 struct DoubleImageArguments {
     alignas(64) double coordinates[4][max_lanes];
     double lod[max_lanes];
@@ -234,7 +237,7 @@ struct DoubleImageArguments {
     std::int32_t offset[3][max_lanes];
     std::int32_t sample[max_lanes];
     std::int32_t gather_offsets[4][2];
-    alignas(64) double result[4][max_lanes];              ///< Zero in lanes that are not live.
+    alignas(64) double result[4][max_lanes];  ///< Zero in lanes that are not live.
 };
 
 }  // namespace nacre::cpu
@@ -245,7 +248,8 @@ struct DoubleImageArguments {
 extern "C" {
 using NacreCpuImageFunction = void (*)(const nacre::cpu::ImageView* image, const nacre::cpu::SamplerState* sampler,
                                        nacre::cpu::ImageArguments* arguments, std::uint32_t flags, std::uint32_t live);
-using NacreCpuDoubleImageFunction = void (*)(const nacre::cpu::ImageView* image, const nacre::cpu::SamplerState* sampler,
+using NacreCpuDoubleImageFunction = void (*)(const nacre::cpu::ImageView* image,
+                                             const nacre::cpu::SamplerState* sampler,
                                              nacre::cpu::DoubleImageArguments* arguments, std::uint32_t flags,
                                              std::uint32_t live);
 }

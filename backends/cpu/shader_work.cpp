@@ -84,8 +84,9 @@ void Executor::draw(const DrawCall& call, std::uint32_t draw_index) {
     for (std::size_t i = 0; i < vertex_buffers_.size(); ++i) {
         const VertexBuffer& bound = vertex_buffers_[i];
         const std::uint64_t size = bound.buffer ? bound.buffer->size_from(bound.offset) : 0;
-        if (size != 0) state.vertex.buffers[i] = {bound.buffer->data() + bound.offset, size,
-                                                  bound.buffer->shadow() ? bound.buffer->shadow() + 2 * bound.offset : nullptr};
+        if (size != 0)
+            state.vertex.buffers[i] = {bound.buffer->data() + bound.offset, size,
+                                       bound.buffer->shadow() ? bound.buffer->shadow() + 2 * bound.offset : nullptr};
     }
     state.vertex.base_vertex = call.indexed ? call.vertex_offset : static_cast<std::int32_t>(call.first);
     state.vertex.base_instance = call.first_instance;

@@ -88,7 +88,8 @@ Expected<std::unique_ptr<rhi::BackendTexture>> CpuTexture::create(const std::sha
         auto* const doubles = reinterpret_cast<double*>(texture->shadow_.data());
         if (!doubles)
             return fail(ErrorCode::out_of_memory, "create texture", fmt::format("'{}'", desc.name),
-                        "there is no memory for its values in double precision", "Free other resources or use a smaller texture.");
+                        "there is no memory for its values in double precision",
+                        "Free other resources or use a smaller texture.");
         for (std::uint32_t mip = 0; mip < desc.mips; ++mip)
             whole.levels[mip].shadow = doubles + offsets[mip] / whole.texel_bytes * doubles_of_texel;
     }

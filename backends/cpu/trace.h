@@ -10,8 +10,8 @@
 #include "rhi/trace.h"
 
 /// @file
-/// Shaders that tell what they compute. A traced program calls the functions below after each of its instructions; it is
-/// compiled when a trace first asks for it, beside the program that runs otherwise.
+/// Shaders that tell what they compute. A traced program calls the functions below after each of its instructions; it
+/// is compiled when a trace first asks for it, beside the program that runs otherwise.
 
 namespace nacre::cpu {
 
@@ -35,9 +35,10 @@ struct TraceFunctions {
     /// An invocation begins; `lane` is negative where the traced one is not among those that begin.
     void (*begin)(ShaderTrace* trace, const TraceTable* table, std::int32_t lane);
     /// `values` has `count` rows of max_lanes.
-    void (*event)(ShaderTrace* trace, std::uint32_t instruction, std::int32_t lane, std::uint32_t live, const double* values,
-                  std::uint32_t count);
-    /// A store to an image at `count` coordinates, by the invocations of the three rows behind them; all rows are integers.
+    void (*event)(ShaderTrace* trace, std::uint32_t instruction, std::int32_t lane, std::uint32_t live,
+                  const double* values, std::uint32_t count);
+    /// A store to an image at `count` coordinates, by the invocations of the three rows behind them; all rows are
+    /// integers.
     void (*write)(ShaderTrace* trace, std::uint32_t live, const std::int32_t* rows, std::uint32_t count);
 };
 TraceFunctions trace_functions();

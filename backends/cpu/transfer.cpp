@@ -25,11 +25,12 @@ BoxRows rows_of(const ImageLevel& level, std::uint32_t layer, const rhi::Offset3
             level.row_stride, level.slice_stride};
 }
 
-/// Channels of formats whose texels are floats of 32 bits and nothing else, so that their doubles can be copied to and from
-/// the words of buffers; 0 of other formats.
+/// Channels of formats whose texels are floats of 32 bits and nothing else, so that their doubles can be copied to and
+/// from the words of buffers; 0 of other formats.
 std::uint32_t float_words(rhi::Format format) {
     const rhi::FormatInfo& facts = rhi::info(format);
-    const bool is_words = facts.kind == rhi::FormatKind::floating && !facts.is_compressed() && facts.block_bytes == 4 * facts.channels;
+    const bool is_words =
+        facts.kind == rhi::FormatKind::floating && !facts.is_compressed() && facts.block_bytes == 4 * facts.channels;
     return is_words ? facts.channels : 0;
 }
 
@@ -47,8 +48,8 @@ void Transfer::copy_buffer(const rhi::CopyBufferCommand& command) {
     if (&source == &destination) {
         std::memmove(to, from, command.size);
         if (source.shadow())
-            std::memmove(destination.shadow() + 2 * command.destination_offset, source.shadow() + 2 * command.source_offset,
-                         2 * command.size);
+            std::memmove(destination.shadow() + 2 * command.destination_offset,
+                         source.shadow() + 2 * command.source_offset, 2 * command.size);
         return;
     }
     if (source.shadow())
@@ -154,8 +155,10 @@ void Transfer::copy_texture(const rhi::CopyTextureCommand& command) {
                     if (!out_shadow) continue;
                     const double* const in_shadow = shadow_at(from_level, in, texel_bytes);
                     const std::uint64_t doubles = row_bytes / texel_bytes * 4;
-                    if (in_shadow && is_same_format) std::memmove(out_shadow, in_shadow, doubles * sizeof(double));
-                    else std::fill_n(out_shadow, doubles, 0.0);
+                    if (in_shadow && is_same_format)
+                        std::memmove(out_shadow, in_shadow, doubles * sizeof(double));
+                    else
+                        std::fill_n(out_shadow, doubles, 0.0);
                 }
             });
     };

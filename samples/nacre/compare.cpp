@@ -26,11 +26,13 @@ std::string texture_text(const measure::BackendResult& result) {
 
 // How wrong single precision is, and where the largest error begins.
 std::string error_text(const measure::BackendResult& result) {
-    TextTable table({"numerical error of", "largest", "of largest value", "relative", "RMS", "at", "field", "double", "single"});
+    TextTable table(
+        {"numerical error of", "largest", "of largest value", "relative", "RMS", "at", "field", "double", "single"});
     for (const measure::NumericalError& error : result.errors) {
         const measure::WrongValue& at = error.largest;
-        const std::string place = at.layer == 0 && at.mip == 0 ? fmt::format("{}, {}", at.x, at.y)
-                                                               : fmt::format("{}, {} layer {} mip {}", at.x, at.y, at.layer, at.mip);
+        const std::string place = at.layer == 0 && at.mip == 0
+                                      ? fmt::format("{}, {}", at.x, at.y)
+                                      : fmt::format("{}, {} layer {} mip {}", at.x, at.y, at.layer, at.mip);
         table.add({error.texture, figure_text(at.error), figure_text(error.share()), figure_text(error.max_rel),
                    figure_text(error.rms), at.error > 0 ? place : "-", at.error > 0 ? at.name : "-",
                    fmt::format("{:.9g}", at.reference), fmt::format("{:.9g}", at.value)});

@@ -17,7 +17,9 @@ namespace {
 using testing::HasSubstr;
 
 TextureData floats(std::vector<float> values, std::uint32_t width) {
-    TextureData texture{.name = "t", .format = rhi::Format::r32_float, .width = width,
+    TextureData texture{.name = "t",
+                        .format = rhi::Format::r32_float,
+                        .width = width,
                         .height = static_cast<std::uint32_t>(values.size()) / width};
     texture.bytes.resize(values.size() * 4);
     std::memcpy(texture.bytes.data(), values.data(), texture.bytes.size());
@@ -73,10 +75,14 @@ rhi::InvocationTrace trace_compute(const char* backend, const std::string& body,
     auto shader = (*device)->create_shader(*words);
     auto pipeline = (*device)->create_compute_pipeline({.shader = *shader, .name = "wrong"});
     EXPECT_TRUE(pipeline) << pipeline.error().message();
-    auto image = (*device)->create_texture(
-        {.format = rhi::Format::r32_float, .width = 16, .height = 16, .usage = rhi::TextureUsage::storage, .name = "image"});
+    auto image = (*device)->create_texture({.format = rhi::Format::r32_float,
+                                            .width = 16,
+                                            .height = 16,
+                                            .usage = rhi::TextureUsage::storage,
+                                            .name = "image"});
     auto layout = (*device)->bind_group_layout(*pipeline, 0);
-    auto group = (*device)->create_bind_group({.layout = *layout, .entries = {{.binding = 0, .texture = *image}}, .name = "group"});
+    auto group = (*device)->create_bind_group(
+        {.layout = *layout, .entries = {{.binding = 0, .texture = *image}}, .name = "group"});
     EXPECT_TRUE(group) << group.error().message();
     const auto run = [&](const rhi::TraceRequest& request) {
         EXPECT_TRUE((*device)->start_trace(request));
@@ -102,20 +108,21 @@ rhi::InvocationTrace trace_compute(const char* backend, const std::string& body,
     return std::move(trace.invocations[0]);
 }
 
-// Invocations write texels in another order than their own coordinates; the difference in line 9 cancels all but a few bits.
+// Invocations write texels in another order than their own coordinates; the difference in line 9 cancels all but a few
+// bits.
 const char* const cancelling =
-    "#version 460\n"                                                                  // 1
-    "layout(local_size_x = 1) in;\n"                                                  // 2
-    "layout(set = 0, binding = 0, r32f) uniform writeonly image2D image;\n"           // 3
-    "void main() {\n"                                                                 // 4
+    "#version 460\n"                                                                          // 1
+    "layout(local_size_x = 1) in;\n"                                                          // 2
+    "layout(set = 0, binding = 0, r32f) uniform writeonly image2D image;\n"                   // 3
+    "void main() {\n"                                                                         // 4
     "    ivec2 texel = ivec2(15 - int(gl_GlobalInvocationID.x), gl_GlobalInvocationID.y);\n"  // 5
-    "    float x = 1.0 + float(texel.x) * 0.001;\n"                                   // 6
-    "    float square = x * x;\n"                                                     // 7
-    "    float other = square + 1.0 / 1024.0 / 16384.0 / float(texel.y + 3);\n"       // 8
-    "    float tiny = other - square;\n"                                              // 9
-    "    float scaled = tiny * 1000.0;\n"                                             // 10
-    "    if (texel.y > 100) scaled += 1.0;\n"                                         // 11
-    "    imageStore(image, texel, vec4(scaled));\n"                                   // 12
+    "    float x = 1.0 + float(texel.x) * 0.001;\n"                                           // 6
+    "    float square = x * x;\n"                                                             // 7
+    "    float other = square + 1.0 / 1024.0 / 16384.0 / float(texel.y + 3);\n"               // 8
+    "    float tiny = other - square;\n"                                                      // 9
+    "    float scaled = tiny * 1000.0;\n"                                                     // 10
+    "    if (texel.y > 100) scaled += 1.0;\n"                                                 // 11
+    "    imageStore(image, texel, vec4(scaled));\n"                                           // 12
     "}\n";
 
 TEST(ErrorOriginTest, IsTheLineWhereDigitsCancel) {
@@ -132,15 +139,20 @@ TEST(ErrorOriginTest, IsNothingWhereBothComputeTheSame) {
 }
 
 rhi::InvocationTrace made_up(std::vector<std::vector<double>> values) {
-    rhi::InvocationTrace trace{"made.comp", {{"Load", "a:1", 1, {9}, true}, {"FMul", "a:2", 2, {1, 1}, true},
-                                             {"FSub", "a:3", 3, {2, 1}, true}, {"FMul", "a:4", 4, {3, 3}, true}, {"Store", "a:5", 8, {4}, true}},
+    rhi::InvocationTrace trace{"made.comp",
+                               {{"Load", "a:1", 1, {9}, true},
+                                {"FMul", "a:2", 2, {1, 1}, true},
+                                {"FSub", "a:3", 3, {2, 1}, true},
+                                {"FMul", "a:4", 4, {3, 3}, true},
+                                {"Store", "a:5", 8, {4}, true}},
                                {}};
     for (std::size_t i = 0; i < values.size(); ++i) trace.events.push_back({static_cast<std::uint32_t>(i), values[i]});
     return trace;
 }
 
 TEST(ErrorOriginTest, IsWhereTheRelativeErrorGrowsMost) {
-    // The product of line 2 is off by 1e-6; the difference of line 3 is small and takes that over, and so on to the store.
+    // The product of line 2 is off by 1e-6; the difference of line 3 is small and takes that over, and so on to the
+    // store.
     const auto reference = made_up({{1.001}, {1.002001}, {0.001001}, {1.002001e-6}, {1.002001e-6}});
     const auto test = made_up({{1.001}, {1.002002}, {0.001002}, {1.002999e-6}, {1.002999e-6}});
     const auto origin = find_error_origin(reference, test);

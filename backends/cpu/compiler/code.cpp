@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/cpu/compiler/code.h"
 
-#include <atomic>
-#include <cmath>
-#include <mutex>
-
 #include <fmt/format.h>
 #include <llvm/Analysis/CGSCCPassManager.h>
 #include <llvm/Analysis/LoopAnalysisManager.h>
@@ -28,8 +24,12 @@
 #include <llvm/Transforms/Scalar/GVN.h>
 #include <llvm/Transforms/Scalar/LICM.h>
 #include <llvm/Transforms/Scalar/LoopPassManager.h>
-#include <llvm/Transforms/Scalar/SROA.h>
 #include <llvm/Transforms/Scalar/SimplifyCFG.h>
+#include <llvm/Transforms/Scalar/SROA.h>
+
+#include <atomic>
+#include <cmath>
+#include <mutex>
 
 #include "backends/cpu/images/double_operations.h"
 #include "backends/cpu/images/image_operations.h"

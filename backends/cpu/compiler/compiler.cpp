@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/cpu/compiler/compiler.h"
 
-#include <cstdlib>
-#include <cstring>
-#include <map>
-
 #include <fmt/format.h>
 #include <llvm/IR/LLVMContext.h>
 #include <llvm/Support/raw_ostream.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <map>
 
 #include "backends/cpu/compiler/code.h"
 #include "backends/cpu/compiler/legalization.h"
@@ -32,14 +32,16 @@ class ShaderCompilation final : public Compiler {
         std::uint32_t subgroups = 1;
         bool has_barriers = false;
         std::vector<NarrowedOperation> narrowed;
-        NACRE_TRY(program.code, compile(source, spv::ExecutionModel::GLCompute, {}, narrowed, [&](llvm::Module& target, const Module& module) {
-                      ComputeEmitter emitter(target, module, options_, source.slots);
-                      emitter.trace_table = source.trace;
-                      emitter.emit();
-                      program.workgroup_size = module.workgroup_size;
-                      workgroup_bytes = emitter.workgroup_bytes, subgroups = emitter.subgroups, has_barriers = emitter.has_barriers;
-                      return Emitted{has_barriers, emitter.narrowed()};
-                  }));
+        NACRE_TRY(program.code, compile(source, spv::ExecutionModel::GLCompute, {}, narrowed,
+                                        [&](llvm::Module& target, const Module& module) {
+                                            ComputeEmitter emitter(target, module, options_, source.slots);
+                                            emitter.trace_table = source.trace;
+                                            emitter.emit();
+                                            program.workgroup_size = module.workgroup_size;
+                                            workgroup_bytes = emitter.workgroup_bytes, subgroups = emitter.subgroups,
+                                            has_barriers = emitter.has_barriers;
+                                            return Emitted{has_barriers, emitter.narrowed()};
+                                        }));
         program.narrowed = std::move(narrowed);
         auto& code = static_cast<LoadedCode&>(*program.code);
         program.run = reinterpret_cast<ComputeFunction>(code.find("kernel"));
@@ -59,12 +61,13 @@ class ShaderCompilation final : public Compiler {
         VertexProgram program;
         std::shared_ptr<CompiledCode> code;
         std::vector<NarrowedOperation> narrowed;
-        NACRE_TRY(code, compile(source, spv::ExecutionModel::Vertex, input, narrowed, [&](llvm::Module& target, const Module& module) {
-                      VertexEmitter emitter(target, module, options_, source.slots, input);
-                      emitter.emit();
-                      program = emitter.program;
-                      return Emitted{false, emitter.narrowed()};
-                  }));
+        NACRE_TRY(code, compile(source, spv::ExecutionModel::Vertex, input, narrowed,
+                                [&](llvm::Module& target, const Module& module) {
+                                    VertexEmitter emitter(target, module, options_, source.slots, input);
+                                    emitter.emit();
+                                    program = emitter.program;
+                                    return Emitted{false, emitter.narrowed()};
+                                }));
         program.in_double = options_.mode == ExecutionMode::double_precision;
         program.narrowed = std::move(narrowed);
         program.name = std::string(source.name);
@@ -78,13 +81,14 @@ class ShaderCompilation final : public Compiler {
         FragmentProgram program;
         std::shared_ptr<CompiledCode> code;
         std::vector<NarrowedOperation> narrowed;
-        NACRE_TRY(code, compile(source, spv::ExecutionModel::Fragment, {}, narrowed, [&](llvm::Module& target, const Module& module) {
-                      FragmentEmitter emitter(target, module, options_, source.slots);
-                      emitter.trace_table = source.trace;
-                      emitter.emit();
-                      program = emitter.program;
-                      return Emitted{false, emitter.narrowed()};
-                  }));
+        NACRE_TRY(code, compile(source, spv::ExecutionModel::Fragment, {}, narrowed,
+                                [&](llvm::Module& target, const Module& module) {
+                                    FragmentEmitter emitter(target, module, options_, source.slots);
+                                    emitter.trace_table = source.trace;
+                                    emitter.emit();
+                                    program = emitter.program;
+                                    return Emitted{false, emitter.narrowed()};
+                                }));
         program.in_double = options_.mode == ExecutionMode::double_precision;
         program.narrowed = std::move(narrowed);
         program.name = std::string(source.name);
@@ -107,8 +111,9 @@ class ShaderCompilation final : public Compiler {
 
     /// Runs `emit`, which gives an Emitted, on a new LLVM module and makes code of it.
     template <typename Emit>
-    Expected<std::shared_ptr<CompiledCode>> compile(const ShaderSource& source, spv::ExecutionModel model, const VertexInput& input,
-                                                    std::vector<NarrowedOperation>& narrowed, Emit&& emit) {
+    Expected<std::shared_ptr<CompiledCode>> compile(const ShaderSource& source, spv::ExecutionModel model,
+                                                    const VertexInput& input, std::vector<NarrowedOperation>& narrowed,
+                                                    Emit&& emit) {
         NACRE_TRY(const std::vector<std::uint32_t> words, legalize(source.spirv, source.specialization, source.name));
         NACRE_TRY(const Module module, Module::parse(words, source.entry_point, model, source.name));
         llvm::LLVMContext context;

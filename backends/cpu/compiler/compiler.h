@@ -24,8 +24,8 @@ namespace nacre::cpu {
 enum class ExecutionMode : std::uint8_t {
     consistent,  ///< No contraction; results do not depend on lanes or threads.
     fast,        ///< Contraction to fused multiply-add.
-    /// The reference: floats of 16 and 32 bits are doubles in registers, and by shadow memory in buffers, images and between
-    /// the stages. No contraction.
+    /// The reference: floats of 16 and 32 bits are doubles in registers, and by shadow memory in buffers, images and
+    /// between the stages. No contraction.
     double_precision,
 };
 

@@ -335,12 +335,16 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
             llvm::Type* to = scalar_type(scalar_of(type_id));
             return unary([&](auto* x) { return math.convert_float(x, to); });
         }
-        case Op::OpQuantizeToF16: note_narrowed("rounding to 16 bits"); return unary([&](auto* x) { return math.quantize_to_f16(x); });
+        case Op::OpQuantizeToF16:
+            note_narrowed("rounding to 16 bits");
+            return unary([&](auto* x) { return math.quantize_to_f16(x); });
         case Op::OpBitcast: {
             const Value from = get(operands[0]);
             if (from.pointer || module.type(type_id).kind == TypeKind::pointer) reject("casts of pointers are not supported");
             const Type &source = scalar_of(operand_type(0)), &to = scalar_of(type_id);
-            const auto is_narrow = [](const Type& scalar) { return scalar.kind == TypeKind::floating && scalar.bits < 64; };
+            const auto is_narrow = [](const Type& scalar) {
+                return scalar.kind == TypeKind::floating && scalar.bits < 64;
+            };
             if (is_narrow(source) || is_narrow(to)) note_narrowed("bit cast");
             std::vector<Component> made;
             if (source.bits == to.bits) {

@@ -4,9 +4,9 @@
 #include "backends/cpu/compiler/emitter.h"
 
 /// @file
-/// Floats as doubles (ExecutionMode::double_precision). In memory each word has a double beside it, its shadow: stores write
-/// both, loads take the shadow where it rounds to the word. So a word that was written by another way (by the host, as an
-/// integer, by an atomic) is never hidden by an older shadow that stands for something else.
+/// Floats as doubles (ExecutionMode::double_precision). In memory each word has a double beside it, its shadow: stores
+/// write both, loads take the shadow where it rounds to the word. So a word that was written by another way (by the
+/// host, as an integer, by an atomic) is never hidden by an older shadow that stands for something else.
 
 namespace nacre::cpu {
 
@@ -26,7 +26,8 @@ Component Emitter::bits_of(const Component& value, const Type& scalar) {
     return apply({value}, [&](auto v) {
         llvm::Value* number = v[0];
         if (in_double() && scalar.bits == 16) return math.float_to_half(number);
-        if (in_double() && scalar.bits == 32) number = builder.CreateFPTrunc(number, like(number, builder.getFloatTy()));
+        if (in_double() && scalar.bits == 32)
+            number = builder.CreateFPTrunc(number, like(number, builder.getFloatTy()));
         return builder.CreateBitCast(number, like(number, integer));
     });
 }
@@ -34,10 +35,14 @@ Component Emitter::bits_of(const Component& value, const Type& scalar) {
 Component Emitter::of_bits(const Component& bits, const Type& scalar) {
     if (scalar.kind != TypeKind::floating) return bits;
     return apply({bits}, [&](auto v) {
-        if (in_double() && scalar.bits == 16) return math.convert_float(math.half_to_float(v[0]), builder.getDoubleTy());
-        llvm::Type* stored = scalar.bits == 16 ? builder.getHalfTy() : scalar.bits == 64 ? builder.getDoubleTy() : builder.getFloatTy();
+        if (in_double() && scalar.bits == 16)
+            return math.convert_float(math.half_to_float(v[0]), builder.getDoubleTy());
+        llvm::Type* stored = scalar.bits == 16   ? builder.getHalfTy()
+                             : scalar.bits == 64 ? builder.getDoubleTy()
+                                                 : builder.getFloatTy();
         llvm::Value* number = builder.CreateBitCast(v[0], like(v[0], stored));
-        return in_double() && scalar.bits == 32 ? builder.CreateFPExt(number, like(number, builder.getDoubleTy())) : number;
+        return in_double() && scalar.bits == 32 ? builder.CreateFPExt(number, like(number, builder.getDoubleTy()))
+                                                : number;
     });
 }
 
@@ -57,7 +62,9 @@ Pointer Emitter::shadow_of(const Pointer& pointer) {
     doubles.offset *= 2;
     if (pointer.dynamic_offset) doubles.dynamic_offset = multiply(pointer.dynamic_offset, 2);
     if (pointer.limit)
-        doubles.limit = apply({pointer.limit}, [&](auto v) { return builder.CreateShl(v[0], llvm::ConstantInt::get(v[0]->getType(), 1)); });
+        doubles.limit = apply({pointer.limit}, [&](auto v) {
+            return builder.CreateShl(v[0], llvm::ConstantInt::get(v[0]->getType(), 1));
+        });
     return doubles;
 }
 
@@ -83,7 +90,8 @@ void Emitter::store_float(const Pointer& pointer, std::int64_t extra, const Type
     store_bytes(pointer, extra, bits, bits_of(value, scalar));
     if (!has_shadow(pointer, scalar)) return;
     bits.bits = 64;
-    const Component shadow = apply({value}, [&](auto v) { return builder.CreateBitCast(v[0], like(v[0], builder.getInt64Ty())); });
+    const Component shadow =
+        apply({value}, [&](auto v) { return builder.CreateBitCast(v[0], like(v[0], builder.getInt64Ty())); });
     store_bytes(shadow_of(pointer), extra * 2, bits, shadow);
 }
 

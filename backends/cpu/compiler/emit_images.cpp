@@ -415,11 +415,13 @@ void Emitter::emit_double_image(const Instruction& at, const ImageAccess& access
     const ImageOperands more = operands_from(at, access.first_operand);
     const ImageOperation operation = access.operation;
     llvm::Type* real = builder.getDoubleTy();
-    llvm::AllocaInst* memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), sizeof(DoubleImageArguments)), "image");
+    llvm::AllocaInst* memory =
+        make_slot(llvm::ArrayType::get(builder.getInt8Ty(), sizeof(DoubleImageArguments)), "image");
     constexpr std::size_t real_row = max_lanes * 8, word_row = max_lanes * 4;
     const auto put = [&](std::size_t offset, const Component& value, llvm::Type* kind) {
         llvm::Value* row = widen(value);
-        if (kind->isDoubleTy() && row->getType()->isIntOrIntVectorTy()) row = builder.CreateSIToFP(row, vector_of(kind));
+        if (kind->isDoubleTy() && row->getType()->isIntOrIntVectorTy())
+            row = builder.CreateSIToFP(row, vector_of(kind));
         if (kind->isIntegerTy()) row = builder.CreateSExtOrTrunc(row, vector_of(kind));
         builder.CreateAlignedStore(row, at_offset(memory, static_cast<std::int64_t>(offset)), llvm::Align(4));
     };
@@ -448,7 +450,8 @@ void Emitter::emit_double_image(const Instruction& at, const ImageAccess& access
         } else {
             flags |= more.lod || (access.is_implicit && !has_quads) ? image_lod_explicit : image_lod_implicit;
             const Id lod = more.lod ? more.lod : more.bias;
-            put(offsetof(DoubleImageArguments, lod), lod ? get_scalar(lod) : Component(llvm::ConstantFP::get(real, 0)), real);
+            put(offsetof(DoubleImageArguments, lod), lod ? get_scalar(lod) : Component(llvm::ConstantFP::get(real, 0)),
+                real);
         }
         if (more.min_lod) {
             flags |= image_min_lod;
@@ -471,11 +474,13 @@ void Emitter::emit_double_image(const Instruction& at, const ImageAccess& access
         flags |= image_offsets;
         const Value offsets = get(more.offsets);
         for (std::size_t i = 0; i < 8 && i < offsets.components.size(); ++i)
-            builder.CreateStore(offsets.components[i].value,
-                                at_offset(memory, static_cast<std::int64_t>(offsetof(DoubleImageArguments, gather_offsets) + i * 4)));
+            builder.CreateStore(
+                offsets.components[i].value,
+                at_offset(memory, static_cast<std::int64_t>(offsetof(DoubleImageArguments, gather_offsets) + i * 4)));
     }
     if (more.sample || type.multisampled)
-        put(offsetof(DoubleImageArguments, sample), more.sample ? get_scalar(more.sample) : Component(int32(0)), builder.getInt32Ty());
+        put(offsetof(DoubleImageArguments, sample), more.sample ? get_scalar(more.sample) : Component(int32(0)),
+            builder.getInt32Ty());
     const bool is_store = operation == ImageOperation::store;
     if (is_store) {
         has_side_effects = true;
@@ -493,20 +498,26 @@ void Emitter::emit_double_image(const Instruction& at, const ImageAccess& access
         slots_of.push_back(make_slot(vector_of(real), "texel"));
         builder.CreateStore(llvm::Constant::getNullValue(vector_of(real)), slots_of.back());
     }
-    for_each_different(image.image, is_store ? effect_mask() : mask, [&](llvm::Value* one_image, llvm::Value* image_mask) {
-        for_each_different(sampler, image_mask, [&](llvm::Value* one_sampler, llvm::Value* lanes_on) {
-            llvm::Value* view = invariant_load(pointer_type, at_offset(one_image, offsetof(Descriptor, image)), 8);
-            llvm::Value* state = has_sampler ? invariant_load(pointer_type, at_offset(one_sampler, offsetof(Descriptor, sampler)), 8)
-                                             : llvm::ConstantPointerNull::get(pointer_type);
-            builder.CreateCall(function, {view, state, memory, int32(static_cast<std::int32_t>(flags)), mask_bits(lanes_on)});
-            for (std::size_t i = 0; i < slots_of.size(); ++i) {
-                llvm::Value* row = builder.CreateAlignedLoad(
-                    vector_of(real), at_offset(memory, static_cast<std::int64_t>(offsetof(DoubleImageArguments, result) + i * real_row)),
-                    llvm::Align(64));
-                builder.CreateStore(select(lanes_on, row, builder.CreateLoad(vector_of(real), slots_of[i])), slots_of[i]);
-            }
+    for_each_different(
+        image.image, is_store ? effect_mask() : mask, [&](llvm::Value* one_image, llvm::Value* image_mask) {
+            for_each_different(sampler, image_mask, [&](llvm::Value* one_sampler, llvm::Value* lanes_on) {
+                llvm::Value* view = invariant_load(pointer_type, at_offset(one_image, offsetof(Descriptor, image)), 8);
+                llvm::Value* state =
+                    has_sampler ? invariant_load(pointer_type, at_offset(one_sampler, offsetof(Descriptor, sampler)), 8)
+                                : llvm::ConstantPointerNull::get(pointer_type);
+                builder.CreateCall(function,
+                                   {view, state, memory, int32(static_cast<std::int32_t>(flags)), mask_bits(lanes_on)});
+                for (std::size_t i = 0; i < slots_of.size(); ++i) {
+                    llvm::Value* row = builder.CreateAlignedLoad(
+                        vector_of(real),
+                        at_offset(memory,
+                                  static_cast<std::int64_t>(offsetof(DoubleImageArguments, result) + i * real_row)),
+                        llvm::Align(64));
+                    builder.CreateStore(select(lanes_on, row, builder.CreateLoad(vector_of(real), slots_of[i])),
+                                        slots_of[i]);
+                }
+            });
         });
-    });
     if (!at.result) return;
     std::vector<Component> values;
     for (std::uint32_t i = 0; i < module.type(at.type).components; ++i)

@@ -139,7 +139,8 @@ Pointer Emitter::buffer_pointer(const Pointer& block) {
     const Component address = descriptor(block);
     if (address.is_uniform()) {
         pointer.base = invariant_load(pointer_type, at_offset(address.value, offsetof(Descriptor, data)), 8);
-        if (in_double()) pointer.shadow = invariant_load(pointer_type, at_offset(address.value, offsetof(Descriptor, shadow)), 8);
+        if (in_double())
+            pointer.shadow = invariant_load(pointer_type, at_offset(address.value, offsetof(Descriptor, shadow)), 8);
         pointer.limit = invariant_load(builder.getInt64Ty(), at_offset(address.value, offsetof(Descriptor, size)), 8);
     } else {
         // A different buffer in each lane.
@@ -149,7 +150,8 @@ Pointer Emitter::buffer_pointer(const Pointer& block) {
         };
         pointer.base = builder.CreateIntToPtr(gather(offsetof(Descriptor, data), builder.getInt64Ty()), vector_of(pointer_type));
         if (in_double())
-            pointer.shadow = builder.CreateIntToPtr(gather(offsetof(Descriptor, shadow), builder.getInt64Ty()), vector_of(pointer_type));
+            pointer.shadow = builder.CreateIntToPtr(gather(offsetof(Descriptor, shadow), builder.getInt64Ty()),
+                                                    vector_of(pointer_type));
         pointer.limit = gather(offsetof(Descriptor, size), builder.getInt64Ty());
     }
     pointer.needs_limit_check = true;
@@ -325,7 +327,8 @@ Component Emitter::load_bytes(const Pointer& pointer, std::int64_t extra, const 
 }
 
 void Emitter::store_bytes(const Pointer& pointer, std::int64_t extra, const Type& scalar, const Component& value) {
-    if (in_double() && scalar.kind == TypeKind::floating && scalar.bits < 64) return store_float(pointer, extra, scalar, value);
+    if (in_double() && scalar.kind == TypeKind::floating && scalar.bits < 64)
+        return store_float(pointer, extra, scalar, value);
     if (pointer.storage != StorageClass::Workgroup) has_side_effects = true;
     const bool is_boolean = scalar.kind == TypeKind::boolean;
     const std::uint32_t bytes = is_boolean ? 4 : scalar.bits / 8;
@@ -364,8 +367,10 @@ void Emitter::store_bytes(const Pointer& pointer, std::int64_t extra, const Type
 /// Where each lane's own scalar of a slot lies: the lanes of a slot lie without gaps, however wide the slot is.
 llvm::Value* Emitter::lane_offsets(const LaneVariable& variable, llvm::Value* numbers, llvm::Type* kind) {
     if (variable.is_uniform) return builder.CreateMul(numbers, splat(int32(variable.slot_bytes)));
-    llvm::Value* slots_before = builder.CreateMul(numbers, splat(int32(static_cast<std::int64_t>(variable.slot_bytes) * lanes)));
-    return builder.CreateAdd(slots_before, builder.CreateMul(lane_numbers(), splat(int32(kind->getScalarSizeInBits() / 8))));
+    llvm::Value* slots_before =
+        builder.CreateMul(numbers, splat(int32(static_cast<std::int64_t>(variable.slot_bytes) * lanes)));
+    return builder.CreateAdd(slots_before,
+                             builder.CreateMul(lane_numbers(), splat(int32(kind->getScalarSizeInBits() / 8))));
 }
 
 Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t index, const Type& scalar) {
@@ -416,9 +421,11 @@ Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t ind
         return finish(value);
     }
     llvm::Value* numbers = builder.CreateAdd(widen(element), splat(int32(number)));
-    llvm::Value* places = builder.CreateGEP(builder.getInt8Ty(), variable.memory, lane_offsets(variable, numbers, kind));
+    llvm::Value* places =
+        builder.CreateGEP(builder.getInt8Ty(), variable.memory, lane_offsets(variable, numbers, kind));
     llvm::Value* lanes_on = both(mask, pointer.valid ? pointer.valid.value : nullptr);
-    return finish(builder.CreateMaskedGather(vector_of(kind), places, llvm::Align(std::min(4u, kind->getScalarSizeInBits() / 8)), lanes_on,
+    return finish(builder.CreateMaskedGather(vector_of(kind), places,
+                                             llvm::Align(std::min(4u, kind->getScalarSizeInBits() / 8)), lanes_on,
                                              llvm::Constant::getNullValue(vector_of(kind))));
 }
 
@@ -460,7 +467,8 @@ void Emitter::store_lane_component(const Pointer& pointer, std::uint32_t index, 
     }
     if (variable.is_uniform) reject("a variable held to be uniform is written at different places");
     llvm::Value* numbers = builder.CreateAdd(widen(element), splat(int32(number)));
-    llvm::Value* places = builder.CreateGEP(builder.getInt8Ty(), variable.memory, lane_offsets(variable, numbers, kind));
+    llvm::Value* places =
+        builder.CreateGEP(builder.getInt8Ty(), variable.memory, lane_offsets(variable, numbers, kind));
     builder.CreateMaskedScatter(widen(stored), places, llvm::Align(std::min(4u, kind->getScalarSizeInBits() / 8)),
                                 both(mask, pointer.valid ? pointer.valid.value : nullptr));
 }

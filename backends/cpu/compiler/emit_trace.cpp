@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-
 #include <llvm/IR/Constants.h>
 #include <llvm/IR/Intrinsics.h>
 #include <spirv-tools/libspirv.h>
+
+#include <algorithm>
 
 #include "backends/cpu/compiler/emitter.h"
 
@@ -21,7 +21,9 @@ std::vector<Id> value_operands(const Instruction& at) {
         case Op::OpCompositeExtract: end = std::min<std::size_t>(end, 1); break;
         case Op::OpCompositeInsert:
         case Op::OpVectorShuffle:
-        case Op::OpImageSampleImplicitLod: case Op::OpImageFetch: case Op::OpImageRead: end = std::min<std::size_t>(end, 2); break;
+        case Op::OpImageSampleImplicitLod:
+        case Op::OpImageFetch:
+        case Op::OpImageRead: end = std::min<std::size_t>(end, 2); break;
         default: break;
     }
     std::vector<Id> list;
@@ -35,7 +37,8 @@ Id Emitter::trace_root(Id pointer) const {
     for (const auto& [id, function] : module.functions())
         for (const Block& block : function.blocks)
             for (const Instruction& at : block.body)
-                if (at.result == pointer && (at.op == Op::OpAccessChain || at.op == Op::OpInBoundsAccessChain || at.op == Op::OpCopyObject))
+                if (at.result == pointer &&
+                    (at.op == Op::OpAccessChain || at.op == Op::OpInBoundsAccessChain || at.op == Op::OpCopyObject))
                     return trace_root(at.operand(0));
     return pointer;
 }
@@ -44,14 +47,15 @@ void Emitter::begin_trace(llvm::Value* is_traced, std::vector<Component> ids) {
     if (!trace_table) return;
     trace_lane = make_slot(builder.getInt32Ty(), "traced");
     // The last one: where a pixel is in the batch twice, it is what stays.
-    llvm::Value* leading =
-        builder.CreateIntrinsic(llvm::Intrinsic::ctlz, {builder.getInt32Ty()}, {mask_bits(is_traced), builder.getFalse()});
+    llvm::Value* leading = builder.CreateIntrinsic(llvm::Intrinsic::ctlz, {builder.getInt32Ty()},
+                                                   {mask_bits(is_traced), builder.getFalse()});
     llvm::Value* lane = builder.CreateSub(int32(31), leading);
     builder.CreateStore(lane, trace_lane);
     invocation_ids = std::move(ids);
     llvm::FunctionCallee function =
         external("nacre_cpu_trace_begin", builder.getVoidTy(), {pointer_type, pointer_type, builder.getInt32Ty()});
-    llvm::Value* table = llvm::ConstantExpr::getIntToPtr(int64(static_cast<std::int64_t>(reinterpret_cast<std::uintptr_t>(trace_table))), pointer_type);
+    llvm::Value* table = llvm::ConstantExpr::getIntToPtr(
+        int64(static_cast<std::int64_t>(reinterpret_cast<std::uintptr_t>(trace_table))), pointer_type);
     builder.CreateCall(function, {load_context(offsetof(ShaderContext, trace), pointer_type), table, lane});
 }
 
@@ -79,15 +83,19 @@ void Emitter::trace(const Instruction& at, Id result, std::vector<Id> operands, 
         trace_table->instructions.push_back(std::move(made));
         trace_table->offsets.push_back(at.offset);
     }
-    llvm::AllocaInst* rows = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), values.size() * max_lanes * 8), "trace");
+    llvm::AllocaInst* rows =
+        make_slot(llvm::ArrayType::get(builder.getInt8Ty(), values.size() * max_lanes * 8), "trace");
     std::int64_t offset = 0;
     for (const Component& value : values) {
         llvm::Value* row = widen(value);
         llvm::Type* wide = vector_of(builder.getDoubleTy());
         llvm::Type* scalar = row->getType()->getScalarType();
-        if (scalar->isIntegerTy(1)) row = builder.CreateUIToFP(row, wide);
-        else if (scalar->isIntegerTy()) row = builder.CreateSIToFP(row, wide);
-        else if (!scalar->isDoubleTy()) row = math.convert_float(row, builder.getDoubleTy());
+        if (scalar->isIntegerTy(1))
+            row = builder.CreateUIToFP(row, wide);
+        else if (scalar->isIntegerTy())
+            row = builder.CreateSIToFP(row, wide);
+        else if (!scalar->isDoubleTy())
+            row = math.convert_float(row, builder.getDoubleTy());
         builder.CreateAlignedStore(row, at_offset(rows, offset), llvm::Align(8));
         offset += max_lanes * 8;
     }
@@ -108,9 +116,10 @@ void Emitter::trace_image_write(const std::vector<Component>& coordinates) {
         builder.CreateAlignedStore(builder.CreateSExtOrTrunc(widen(all[i]), vector_of(builder.getInt32Ty())),
                                    at_offset(rows, static_cast<std::int64_t>(i * max_lanes * 4)), llvm::Align(4));
     llvm::Type* word = builder.getInt32Ty();
-    llvm::FunctionCallee function = external("nacre_cpu_trace_write", builder.getVoidTy(), {pointer_type, word, pointer_type, word});
-    builder.CreateCall(function, {load_context(offsetof(ShaderContext, trace), pointer_type), mask_bits(effect_mask()), rows,
-                                  int32(static_cast<std::int64_t>(coordinates.size()))});
+    llvm::FunctionCallee function =
+        external("nacre_cpu_trace_write", builder.getVoidTy(), {pointer_type, word, pointer_type, word});
+    builder.CreateCall(function, {load_context(offsetof(ShaderContext, trace), pointer_type), mask_bits(effect_mask()),
+                                  rows, int32(static_cast<std::int64_t>(coordinates.size()))});
 }
 
 }  // namespace nacre::cpu

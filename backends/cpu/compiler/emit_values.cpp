@@ -32,7 +32,8 @@ Value Emitter::constant(Id id) {
                                                        : llvm::APFloat::IEEEdouble(),
                                      word->getUniqueInteger());
                 bool is_inexact = false;
-                if (in_double()) number.convert(llvm::APFloat::IEEEdouble(), llvm::APFloat::rmNearestTiesToEven, &is_inexact);
+                if (in_double())
+                    number.convert(llvm::APFloat::IEEEdouble(), llvm::APFloat::rmNearestTiesToEven, &is_inexact);
                 value.components = {llvm::ConstantFP::get(context, number)};
             }
             break;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <llvm/IR/IRBuilder.h>
+#include <llvm/IR/Module.h>
+
 #include <functional>
 #include <map>
 #include <memory>
@@ -8,9 +11,6 @@
 #include <unordered_map>
 #include <unordered_set>
 #include <vector>
-
-#include <llvm/IR/IRBuilder.h>
-#include <llvm/IR/Module.h>
 
 #include "backends/cpu/compiler/compiler.h"
 #include "backends/cpu/compiler/math/math.h"
@@ -124,7 +124,8 @@ class Emitter {
     virtual ~Emitter() = default;
     /// Set before the emission of a program that tells what it computes, and filled by it.
     TraceTable* trace_table = nullptr;
-    /// Instructions that went through single precision on a device in double precision: offset in the module and what they do.
+    /// Instructions that went through single precision on a device in double precision: offset in the module and what
+    /// they do.
     [[nodiscard]] const std::map<std::uint32_t, std::string>& narrowed() const { return narrowed_; }
     Emitter(const Emitter&) = delete;
     Emitter& operator=(const Emitter&) = delete;
@@ -133,8 +134,8 @@ class Emitter {
     // ---- Types and small parts (emitter.cpp)
     [[nodiscard]] llvm::Type* scalar_type(const Type& type);
     // Double precision (emit_double.cpp).
-    /// Whether all floats are doubles in registers, whatever the width of their type. Types keep that width: it counts in
-    /// memory, for bits, and wherever a value has to go through single precision.
+    /// Whether all floats are doubles in registers, whatever the width of their type. Types keep that width: it counts
+    /// in memory, for bits, and wherever a value has to go through single precision.
     [[nodiscard]] bool in_double() const { return options.mode == ExecutionMode::double_precision; }
     /// What a float of 32 bits is in registers.
     [[nodiscard]] llvm::Type* real_type() { return in_double() ? builder.getDoubleTy() : builder.getFloatTy(); }

@@ -158,7 +158,8 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
                         llvm::Value* from = primitive_double(offset).value;
                         return Component(builder.CreateFMul(builder.CreateFSub(place, from), scale.value));
                     };
-                    return {inside(center.x, offsetof(DoublePrimitive, point_x)), inside(center.y, offsetof(DoublePrimitive, point_y))};
+                    return {inside(center.x, offsetof(DoublePrimitive, point_x)),
+                            inside(center.y, offsetof(DoublePrimitive, point_y))};
                 }
                 llvm::Value* scale = primitive_word(offsetof(PrimitiveData, inverse_point_size), builder.getFloatTy()).value;
                 llvm::Value* left = primitive_word(offsetof(PrimitiveData, point_x), builder.getFloatTy()).value;
@@ -230,8 +231,10 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
                 llvm::Value* which = widen(get_scalar(at.operand(3)));
                 llvm::Value *x = nullptr, *y = nullptr;
                 for (std::size_t i = sample_places.size(); i-- > 0;) {
-                    llvm::Value* here_x = llvm::ConstantFP::get(vector_of(real_type()), static_cast<double>(sample_places[i][0]));
-                    llvm::Value* here_y = llvm::ConstantFP::get(vector_of(real_type()), static_cast<double>(sample_places[i][1]));
+                    llvm::Value* here_x =
+                        llvm::ConstantFP::get(vector_of(real_type()), static_cast<double>(sample_places[i][0]));
+                    llvm::Value* here_y =
+                        llvm::ConstantFP::get(vector_of(real_type()), static_cast<double>(sample_places[i][1]));
                     llvm::Value* is_this = builder.CreateICmpEQ(which, llvm::ConstantInt::get(which->getType(), i));
                     x = x ? select(is_this, here_x, x) : here_x;
                     y = y ? select(is_this, here_y, y) : here_y;
@@ -267,7 +270,8 @@ void FragmentEmitter::store_outputs() {
         in_double() ? invariant_load(pointer_type, at_offset(batch, offsetof(FragmentBatch, doubles)), 8) : nullptr;
     const auto put_double = [&](std::size_t offset, const Component& value) {
         if (value.value->getType()->getScalarType()->isDoubleTy())
-            builder.CreateAlignedStore(widen(value), at_offset(doubles, static_cast<std::int64_t>(offset)), llvm::Align(64));
+            builder.CreateAlignedStore(widen(value), at_offset(doubles, static_cast<std::int64_t>(offset)),
+                                       llvm::Align(64));
     };
     for (const Id id : module.interface()) {
         const Variable* variable = module.variable(id);
@@ -281,8 +285,8 @@ void FragmentEmitter::store_outputs() {
                 program.writes_depth = true;
                 put(offsetof(FragmentBatch, depth));
                 put_double(offsetof(FragmentDoubles, depth), values.at(0));
-            }
-            else if (*variable->builtin == BuiltIn::SampleMask) program.writes_sample_mask = true, put(offsetof(FragmentBatch, sample_mask_out));
+            } else if (*variable->builtin == BuiltIn::SampleMask)
+                program.writes_sample_mask = true, put(offsetof(FragmentBatch, sample_mask_out));
             else reject("a built-in output is not supported in fragment shaders");
             continue;
         }
@@ -329,19 +333,22 @@ void FragmentEmitter::emit_batch() {
     for (std::uint32_t i = 0; i < lanes; ++i) step_x[i] = i & 1, step_y[i] = i >> 1 & 1;
     llvm::Value* const corner_x = x;
     llvm::Value* const corner_y = y;
-    pixel_x = builder.CreateSIToFP(builder.CreateAdd(x, llvm::ConstantDataVector::get(context, step_x)), vector_of(real_type()));
-    pixel_y = builder.CreateSIToFP(builder.CreateAdd(y, llvm::ConstantDataVector::get(context, step_y)), vector_of(real_type()));
+    pixel_x = builder.CreateSIToFP(builder.CreateAdd(x, llvm::ConstantDataVector::get(context, step_x)),
+                                   vector_of(real_type()));
+    pixel_y = builder.CreateSIToFP(builder.CreateAdd(y, llvm::ConstantDataVector::get(context, step_y)),
+                                   vector_of(real_type()));
     declare_inputs();
     const auto batch_float = [&](std::size_t offset) {
-        llvm::Value* number = builder.CreateAlignedLoad(builder.getFloatTy(), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4));
+        llvm::Value* number = builder.CreateAlignedLoad(
+            builder.getFloatTy(), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4));
         return splat(from_single(number).value);
     };
     center = place_at(batch_float(offsetof(FragmentBatch, sample_x)), batch_float(offsetof(FragmentBatch, sample_y)));
     centroid = center;
     if (program.uses_centroid) {
         const auto lane_float = [&](std::size_t offset) {
-            llvm::Value* numbers =
-                builder.CreateAlignedLoad(vector_of(builder.getFloatTy()), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
+            llvm::Value* numbers = builder.CreateAlignedLoad(
+                vector_of(builder.getFloatTy()), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
             return from_single(numbers).value;
         };
         centroid = place_at(lane_float(offsetof(FragmentBatch, centroid_x)), lane_float(offsetof(FragmentBatch, centroid_y)));
@@ -353,11 +360,14 @@ void FragmentEmitter::emit_batch() {
     if (trace_table) {
         llvm::Value* wanted = load_context(offsetof(ShaderContext, trace), pointer_type);
         const auto is_at = [&](llvm::Value* corner_of, const std::vector<std::uint32_t>& step, std::size_t axis) {
-            llvm::Value* coordinate =
-                invariant_load(builder.getInt32Ty(), at_offset(wanted, static_cast<std::int64_t>(offsetof(ShaderTrace, invocation) + 4 * axis)), 4);
-            return builder.CreateICmpEQ(builder.CreateAdd(corner_of, llvm::ConstantDataVector::get(context, step)), splat(coordinate));
+            llvm::Value* coordinate = invariant_load(
+                builder.getInt32Ty(),
+                at_offset(wanted, static_cast<std::int64_t>(offsetof(ShaderTrace, invocation) + 4 * axis)), 4);
+            return builder.CreateICmpEQ(builder.CreateAdd(corner_of, llvm::ConstantDataVector::get(context, step)),
+                                        splat(coordinate));
         };
-        begin_trace(builder.CreateAnd(live(), builder.CreateAnd(is_at(corner_x, step_x, 0), is_at(corner_y, step_y, 1))), {});
+        begin_trace(
+            builder.CreateAnd(live(), builder.CreateAnd(is_at(corner_x, step_x, 0), is_at(corner_y, step_y, 1))), {});
     }
     declare_variables();
     emit_function(module.entry(), {}, all_lanes());

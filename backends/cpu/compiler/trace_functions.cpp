@@ -17,7 +17,8 @@ void event(ShaderTrace* trace, std::uint32_t instruction, std::int32_t lane, std
     // Only one thread works on the traced invocation: nobody else has come past the lines above.
     const std::lock_guard lock(trace->mutex);
     rhi::TraceEvent noted{instruction, {}};
-    for (std::uint32_t i = 0; i < count; ++i) noted.values.push_back(values[i * max_lanes + static_cast<std::uint32_t>(lane)]);
+    for (std::uint32_t i = 0; i < count; ++i)
+        noted.values.push_back(values[i * max_lanes + static_cast<std::uint32_t>(lane)]);
     trace->found.invocations.back().events.push_back(std::move(noted));
 }
 
@@ -29,7 +30,8 @@ void write(ShaderTrace* trace, std::uint32_t live, const std::int32_t* rows, std
             is_texel = is_texel && static_cast<std::uint32_t>(rows[i * max_lanes + lane]) == trace->texel[i];
         if (!is_texel) continue;
         std::array<std::uint32_t, 3> invocation;
-        for (std::uint32_t i = 0; i < 3; ++i) invocation[i] = static_cast<std::uint32_t>(rows[(count + i) * max_lanes + lane]);
+        for (std::uint32_t i = 0; i < 3; ++i)
+            invocation[i] = static_cast<std::uint32_t>(rows[(count + i) * max_lanes + lane]);
         const std::lock_guard lock(trace->mutex);
         trace->found.writers.push_back(invocation);
     }

@@ -98,9 +98,11 @@ Component VertexEmitter::fetch(const rhi::VertexAttribute& attribute, std::uint3
                 if (layout.stride % 4 != 0 || attribute.offset % 4 != 0) return plain;
                 // The word's double, where it stands for the word.
                 const std::size_t shadow_offset = binding + offsetof(VertexBufferBinding, shadow);
-                llvm::Value* shadow = invariant_load(pointer_type, at_offset(draw, static_cast<std::int64_t>(shadow_offset)), 8);
+                llvm::Value* shadow =
+                    invariant_load(pointer_type, at_offset(draw, static_cast<std::int64_t>(shadow_offset)), 8);
                 llvm::Value* twice = builder.CreateShl(begin, llvm::ConstantInt::get(begin->getType(), 1));
-                llvm::Value* places = builder.CreateGEP(builder.getInt8Ty(), at_offset(shadow, 2 * extra), is_fixed ? splat(twice) : twice);
+                llvm::Value* places = builder.CreateGEP(builder.getInt8Ty(), at_offset(shadow, 2 * extra),
+                                                        is_fixed ? splat(twice) : twice);
                 llvm::Value* none = llvm::Constant::getNullValue(vector_of(real_type()));
                 const Component precise = builder.CreateMaskedGather(vector_of(real_type()), places, llvm::Align(8),
                                                                      is_fixed ? splat(fits) : fits, none);
@@ -156,7 +158,8 @@ void VertexEmitter::store_outputs() {
     const auto put = [&](std::uint32_t slot, const Component& value) {
         builder.CreateAlignedStore(widen(to_word(value)), at_offset(outputs, std::int64_t{slot} * max_lanes * 4), llvm::Align(64));
         if (value.value->getType()->getScalarType()->isDoubleTy())
-            builder.CreateAlignedStore(widen(value), at_offset(doubles, std::int64_t{slot} * max_lanes * 8), llvm::Align(64));
+            builder.CreateAlignedStore(widen(value), at_offset(doubles, std::int64_t{slot} * max_lanes * 8),
+                                       llvm::Align(64));
     };
     bool has_point_size = false;
     // Clip distances come before cull distances, wherever the shader declares them.
@@ -212,7 +215,8 @@ void VertexEmitter::store_outputs() {
         for (std::uint32_t i = 0; i < output.values.size() && first + i < first_user_slot; ++i) put(first + i, output.values[i]);
     }
     if (!has_position)
-        for (std::uint32_t i = 0; i < 4; ++i) put(slot_position + i, Component(llvm::ConstantFP::get(real_type(), i == 3)));
+        for (std::uint32_t i = 0; i < 4; ++i)
+            put(slot_position + i, Component(llvm::ConstantFP::get(real_type(), i == 3)));
     if (!has_point_size) put(slot_point_size, Component(llvm::ConstantFP::get(real_type(), 1)));
     program.writes_point_size = has_point_size;
     std::ranges::sort(program.outputs, {}, [](const VertexOutput& at) { return std::pair(at.location, at.component); });

@@ -33,7 +33,9 @@ Axes axes_of(rhi::ViewDimension dimension) {
 
 /// Whole numbers from coordinates of any kind: NaN counts as 0, and nothing is farther away than texels can be.
 std::int64_t whole(double value) {
-    return std::isnan(value) ? 0 : static_cast<std::int64_t>(std::clamp(std::floor(value), -farthest_texel, farthest_texel));
+    return std::isnan(value)
+               ? 0
+               : static_cast<std::int64_t>(std::clamp(std::floor(value), -farthest_texel, farthest_texel));
 }
 
 std::int64_t modulo(std::int64_t value, std::int64_t period) {
@@ -45,8 +47,12 @@ using Vector = std::array<double, 3>;
 
 /// The axes of the faces of a cube: s, t, and outward (Vulkan specification, "Cube Map Face Selection").
 constexpr std::array<std::array<Vector, 3>, 6> face_axes{{
-    {{{0, 0, -1}, {0, -1, 0}, {1, 0, 0}}}, {{{0, 0, 1}, {0, -1, 0}, {-1, 0, 0}}}, {{{1, 0, 0}, {0, 0, 1}, {0, 1, 0}}},
-    {{{1, 0, 0}, {0, 0, -1}, {0, -1, 0}}}, {{{1, 0, 0}, {0, -1, 0}, {0, 0, 1}}},  {{{-1, 0, 0}, {0, -1, 0}, {0, 0, -1}}},
+    {{{0, 0, -1}, {0, -1, 0}, {1, 0, 0}}},
+    {{{0, 0, 1}, {0, -1, 0}, {-1, 0, 0}}},
+    {{{1, 0, 0}, {0, 0, 1}, {0, 1, 0}}},
+    {{{1, 0, 0}, {0, 0, -1}, {0, -1, 0}}},
+    {{{1, 0, 0}, {0, -1, 0}, {0, 0, 1}}},
+    {{{-1, 0, 0}, {0, -1, 0}, {0, 0, -1}}},
 }};
 
 double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -92,10 +98,15 @@ bool holds(rhi::CompareOperation operation, double reference, double depth) {
 /// One operation of one lane.
 class Lane {
   public:
-    Lane(const ImageView& image, const SamplerState* sampler, const DoubleImageArguments& arguments, std::uint32_t flags,
-         std::uint32_t number)
-        : image_(image), sampler_(sampler ? &sampler->desc : nullptr), arguments_(arguments), flags_(flags), lane_(number),
-          axes_(axes_of(image.dimension)), plan_(format_plan(image.format)) {}
+    Lane(const ImageView& image, const SamplerState* sampler, const DoubleImageArguments& arguments,
+         std::uint32_t flags, std::uint32_t number)
+        : image_(image),
+          sampler_(sampler ? &sampler->desc : nullptr),
+          arguments_(arguments),
+          flags_(flags),
+          lane_(number),
+          axes_(axes_of(image.dimension)),
+          plan_(format_plan(image.format)) {}
 
     [[nodiscard]] DoubleTexel fetch() const {
         const std::int64_t level = has(ImageOperation::fetch) && image_.samples == 1 ? whole(arguments_.lod[lane_]) : 0;
@@ -194,7 +205,8 @@ class Lane {
     [[nodiscard]] std::uint64_t offset_of(const ImageLevel& level, std::int64_t x, std::int64_t y, std::int64_t slice,
                                           std::int64_t sample) const {
         const auto edge = static_cast<std::int64_t>(rhi::info(image_.format).block_width);
-        const std::uint64_t stride = image_.dimension == rhi::ViewDimension::d3 ? level.slice_stride : level.layer_stride;
+        const std::uint64_t stride =
+            image_.dimension == rhi::ViewDimension::d3 ? level.slice_stride : level.layer_stride;
         return static_cast<std::uint64_t>(slice) * stride + static_cast<std::uint64_t>(sample) * level.sample_stride +
                static_cast<std::uint64_t>(y / edge) * level.row_stride +
                static_cast<std::uint64_t>(x / edge) * plan_.texel_bytes;
@@ -217,7 +229,8 @@ class Lane {
     bool texel_place(std::int64_t number, std::array<std::int64_t, 4>& at) const {
         const ImageLevel& level = image_.levels[static_cast<std::size_t>(number)];
         const auto coordinate = [&](std::size_t axis) {
-            const double value = arguments_.coordinates[axis][lane_] + (flag(image_offset) && axis < 3 ? arguments_.offset[axis][lane_] : 0);
+            const double value = arguments_.coordinates[axis][lane_] +
+                                 (flag(image_offset) && axis < 3 ? arguments_.offset[axis][lane_] : 0);
             return static_cast<std::int64_t>(value);
         };
         const auto inside = [](std::int64_t value, std::uint32_t size) { return value >= 0 && value < size; };
@@ -230,7 +243,8 @@ class Lane {
             at[2] = static_cast<std::int64_t>(arguments_.coordinates[axes_.spatial == 1 ? 1 : 2][lane_]);
             is_inside = is_inside && inside(at[2], image_.layer_count);
         }
-        if (image_.samples > 1) at[3] = arguments_.sample[lane_], is_inside = is_inside && inside(at[3], image_.samples);
+        if (image_.samples > 1)
+            at[3] = arguments_.sample[lane_], is_inside = is_inside && inside(at[3], image_.samples);
         return is_inside;
     }
 
@@ -248,10 +262,13 @@ class Lane {
             for (std::size_t axis = 0; axis < static_cast<std::size_t>(axes_.spatial); ++axis)
                 offset_[axis] = arguments_.offset[axis][lane_];
         reference_ = arguments_.reference[lane_];
-        if (flag(image_compare) && plan_.is_fixed_point_depth) reference_ = reference_ > 0 ? std::min(reference_, 1.0) : 0.0;
+        if (flag(image_compare) && plan_.is_fixed_point_depth)
+            reference_ = reference_ > 0 ? std::min(reference_, 1.0) : 0.0;
     }
 
-    [[nodiscard]] double compared(double depth) const { return holds(sampler_->compare, reference_, depth) ? 1.0 : 0.0; }
+    [[nodiscard]] double compared(double depth) const {
+        return holds(sampler_->compare, reference_, depth) ? 1.0 : 0.0;
+    }
 
     /// Vulkan specification, "Scale Factor Operation", "LOD Operation".
     [[nodiscard]] Detail level_of_detail() const {
@@ -263,8 +280,10 @@ class Lane {
             Vector dx{}, dy{};
             for (std::size_t axis = 0; axis < static_cast<std::size_t>(axes_.spatial); ++axis) {
                 const double* row = arguments_.coordinates[axis];
-                dx[axis] = flag(image_lod_gradient) ? arguments_.gradient_x[axis][lane_] : row[lane_ | 1] - row[lane_ & ~1u];
-                dy[axis] = flag(image_lod_gradient) ? arguments_.gradient_y[axis][lane_] : row[lane_ | 2] - row[lane_ & ~2u];
+                dx[axis] =
+                    flag(image_lod_gradient) ? arguments_.gradient_x[axis][lane_] : row[lane_ | 1] - row[lane_ & ~1u];
+                dy[axis] =
+                    flag(image_lod_gradient) ? arguments_.gradient_y[axis][lane_] : row[lane_ | 2] - row[lane_ & ~2u];
             }
             std::size_t count = static_cast<std::size_t>(axes_.spatial);
             if (axes_.is_cube) {
@@ -304,8 +323,7 @@ class Lane {
     /// The first mip, and the weight of the one behind it.
     [[nodiscard]] std::pair<std::uint32_t, double> levels_of(double lambda) const {
         const double last = image_.mip_count - 1, d = lambda > 0 ? std::min(lambda, last) : 0.0;
-        if (sampler_->mip == rhi::Filter::linear)
-            return {static_cast<std::uint32_t>(std::floor(d)), d - std::floor(d)};
+        if (sampler_->mip == rhi::Filter::linear) return {static_cast<std::uint32_t>(std::floor(d)), d - std::floor(d)};
         return {static_cast<std::uint32_t>(std::clamp(std::ceil(d + 0.5) - 1, 0.0, last)), 0.0};
     }
 
@@ -389,7 +407,8 @@ class Lane {
             u = std::isnan(u) ? 0.0 : std::clamp(u, -farthest_texel, farthest_texel);
             first[axis] = whole(u);
             // Just below a period rounds up to it.
-            if (!is_linear && modes[axis] == rhi::AddressMode::repeat) first[axis] = std::min<std::int64_t>(first[axis], size[axis] - 1);
+            if (!is_linear && modes[axis] == rhi::AddressMode::repeat)
+                first[axis] = std::min<std::int64_t>(first[axis], size[axis] - 1);
             weights[axis] = u - std::floor(u);
             if (has_offset_) first[axis] += offset_[axis];
         }
@@ -412,7 +431,9 @@ class Lane {
     /// Vulkan specification, "Cube Map Edge Handling": a texel beyond an edge is the one that lies there on the cube.
     [[nodiscard]] Footprint cube_footprint(std::uint32_t number, bool is_linear) const {
         const auto n = static_cast<std::int64_t>(image_.levels[number].width);
-        const auto in_face = [&](double s) { return std::isnan(s) ? 0.0 : std::clamp(s * static_cast<double>(n), 0.0, double(n)); };
+        const auto in_face = [&](double s) {
+            return std::isnan(s) ? 0.0 : std::clamp(s * static_cast<double>(n), 0.0, double(n));
+        };
         const double u = in_face(cube_.s()) - (is_linear ? 0.5 : 0.0), v = in_face(cube_.t()) - (is_linear ? 0.5 : 0.0);
         Footprint result;
         if (!is_linear) {
@@ -423,15 +444,16 @@ class Lane {
         result.count = 4;
         const double weight_u = u - std::floor(u), weight_v = v - std::floor(v);
         for (std::size_t tap = 0; tap < 4; ++tap) {
-            std::int64_t x = whole(u) + static_cast<std::int64_t>(tap & 1), y = whole(v) + static_cast<std::int64_t>(tap >> 1);
+            std::int64_t x = whole(u) + static_cast<std::int64_t>(tap & 1),
+                         y = whole(v) + static_cast<std::int64_t>(tap >> 1);
             int face = cube_.face;
             const bool outside_x = x < 0 || x >= n, outside_y = y < 0 || y >= n;
             Tap& found = result.taps[tap];
             found.weight = (tap & 1 ? weight_u : 1 - weight_u) * (tap & 2 ? weight_v : 1 - weight_v);
             found.is_corner = outside_x && outside_y;
             if (outside_x != outside_y) {
-                // The center of the texel, as far outside of the face as half a texel: seen from the middle of the cube it
-                // lies on its neighbor, in the row at the edge and in the column that goes on.
+                // The center of the texel, as far outside of the face as half a texel: seen from the middle of the cube
+                // it lies on its neighbor, in the row at the edge and in the column that goes on.
                 const auto& axes = face_axes[static_cast<std::size_t>(face)];
                 const double s = (2.0 * static_cast<double>(x) + 1) / static_cast<double>(n) - 1;
                 const double t = (2.0 * static_cast<double>(y) + 1) / static_cast<double>(n) - 1;
@@ -442,7 +464,8 @@ class Lane {
                 x = std::clamp<std::int64_t>(whole(there.s() * static_cast<double>(n)), 0, n - 1);
                 y = std::clamp<std::int64_t>(whole(there.t() * static_cast<double>(n)), 0, n - 1);
             }
-            found.texel = texel(number, std::clamp<std::int64_t>(x, 0, n - 1), std::clamp<std::int64_t>(y, 0, n - 1), slice_ + face);
+            found.texel = texel(number, std::clamp<std::int64_t>(x, 0, n - 1), std::clamp<std::int64_t>(y, 0, n - 1),
+                                slice_ + face);
         }
         return result;
     }

@@ -12,9 +12,7 @@ namespace nacre::cpu {
 namespace {
 
 /// Linear value of an sRGB code in [0, 1]. Source: IEC 61966-2-1.
-double linear_of_srgb(double code) {
-    return code <= 0.04045 ? code / 12.92 : std::pow((code + 0.055) / 1.055, 2.4);
-}
+double linear_of_srgb(double code) { return code <= 0.04045 ? code / 12.92 : std::pow((code + 0.055) / 1.055, 2.4); }
 
 double code_over_most(float value, double most) { return std::nearbyint(static_cast<double>(value) * most) / most; }
 
@@ -41,7 +39,8 @@ bool has_shadow(rhi::Format format) {
     return facts.channels != 0 && !facts.is_integer() && !facts.is_compressed() && format != rhi::Format::rgb9e5_float;
 }
 
-DoubleTexel decode_double(rhi::Format format, const std::byte* block, std::uint32_t x_in_block, std::uint32_t y_in_block) {
+DoubleTexel decode_double(rhi::Format format, const std::byte* block, std::uint32_t x_in_block,
+                          std::uint32_t y_in_block) {
     const Texel texel = decode_texel(format, block, x_in_block, y_in_block);
     DoubleTexel values;
     for (std::size_t c = 0; c < 4; ++c) values[c] = texel.f[c];
@@ -59,7 +58,8 @@ DoubleTexel decode_double(rhi::Format format, const std::byte* block, std::uint3
                                                : code_over_most(texel.f[c], 255.0);
         return values;
     }
-    if (plan.codec == Codec::block_channels || plan.codec == Codec::shared_exponent || plan.codec == Codec::none) return values;
+    if (plan.codec == Codec::block_channels || plan.codec == Codec::shared_exponent || plan.codec == Codec::none)
+        return values;
     for (std::size_t c = 0; c < plan.channel_count; ++c) {
         const ChannelPlan& channel = plan.channels[c];
         if (channel.coding == ChannelCoding::unorm || channel.coding == ChannelCoding::snorm)
@@ -83,7 +83,8 @@ DoubleTexel load_double(rhi::Format format, const std::byte* texel, const double
 void store_double(rhi::Format format, const DoubleTexel& values, std::byte* texel, double* shadow) {
     const FormatPlan& plan = format_plan(format);
     DoubleTexel kept{};
-    for (std::size_t c = 0; c < plan.channel_count && c < 4; ++c) kept[c] = in_range(values[c], plan.channels[c].coding);
+    for (std::size_t c = 0; c < plan.channel_count && c < 4; ++c)
+        kept[c] = in_range(values[c], plan.channels[c].coding);
     encode(format, kept.data(), texel);
     if (shadow) std::ranges::copy(kept, shadow);
 }

@@ -364,9 +364,11 @@ std::uint32_t Assembler::vertex_between(const SetupVertex& a, const SetupVertex&
     auto* const inputs = const_cast<float*>(made.inputs());
     for (std::uint32_t i = 0; i < draw_.row_count; ++i) inputs[i] = mixed(from.inputs()[i], to.inputs()[i]);
     if (draw_.plan.in_double) {
-        const double *from_doubles = vertex_doubles(from, draw_.row_count), *to_doubles = vertex_doubles(to, draw_.row_count);
+        const double *from_doubles = vertex_doubles(from, draw_.row_count),
+                     *to_doubles = vertex_doubles(to, draw_.row_count);
         double* const doubles = vertex_doubles(made, draw_.row_count);
-        for (std::uint32_t i = 0; i < 4 + draw_.row_count; ++i) doubles[i] = from_doubles[i] * (1.0 - t) + to_doubles[i] * t;
+        for (std::uint32_t i = 0; i < 4 + draw_.row_count; ++i)
+            doubles[i] = from_doubles[i] * (1.0 - t) + to_doubles[i] * t;
     }
     return static_cast<std::uint32_t>(offset / 16);
 }
@@ -464,7 +466,8 @@ void sort_into_bins(Chunk& chunk, const ChunkScratch& scratch, std::uint32_t til
 
 }  // namespace
 
-double depth_bias(DepthLayout layout, float constant, float slope_factor, float clamp, double slope, double largest_depth) {
+double depth_bias(DepthLayout layout, float constant, float slope_factor, float clamp, double slope,
+                  double largest_depth) {
     if (constant == 0.0f && slope_factor == 0.0f) return 0.0;
     double unit = 0.0;
     switch (layout) {

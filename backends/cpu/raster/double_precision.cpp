@@ -34,8 +34,8 @@ Corner corner_of(const DrawPlan& draw, const std::byte* vertex_memory, std::uint
 }
 
 /// Planes by differences to the first vertex.
-void planes_by_slopes(const DrawPlan& draw, const Corner (&corners)[3], const Corner& provoking, const SlopeWeights& weights,
-                      DoublePrimitive& made) {
+void planes_by_slopes(const DrawPlan& draw, const Corner (&corners)[3], const Corner& provoking,
+                      const SlopeWeights& weights, DoublePrimitive& made) {
     const auto plane = [&](double f0, double f1, double f2) -> DoublePlane {
         return {f0, (f1 - f0) * weights.first_x + (f2 - f0) * weights.second_x,
                 (f1 - f0) * weights.first_y + (f2 - f0) * weights.second_y};
@@ -53,7 +53,8 @@ void planes_by_slopes(const DrawPlan& draw, const Corner (&corners)[3], const Co
 }
 
 /// Planes of a triangle from its clip coordinates, wherever its vertices are.
-void planes_by_weights(const DrawPlan& draw, const Corner (&corners)[3], const PrimitiveData& primitive, DoublePrimitive& made) {
+void planes_by_weights(const DrawPlan& draw, const Corner (&corners)[3], const PrimitiveData& primitive,
+                       DoublePrimitive& made) {
     // Relative to the reference, near which nothing cancels.
     ScreenPoint points[3];
     for (int i = 0; i < 3; ++i) {
@@ -63,7 +64,7 @@ void planes_by_weights(const DrawPlan& draw, const Corner (&corners)[3], const P
     }
     const HomogeneousWeights weights = homogeneous_weights(points);
     const bool in_front = points[0].w > 0.0 && points[1].w > 0.0 && points[2].w > 0.0;
-    const auto plane = [&](const double (&values)[3]) {
+    const auto plane = [&](const double(&values)[3]) {
         DoublePlane sum{};
         for (int i = 0; i < 3; ++i)
             sum.c += values[i] * weights.c[i], sum.dx += values[i] * weights.x[i], sum.dy += values[i] * weights.y[i];
@@ -111,7 +112,8 @@ double blend_factor(BlendFactor factor, const BlendInputs& inputs, std::size_t c
         case one_minus_destination_alpha: return 1.0 - inputs.destination[3];
         case constant_color: return inputs.constant[channel];
         case one_minus_constant_color: return 1.0 - inputs.constant[channel];
-        case source_alpha_saturated: return channel == 3 ? 1.0 : std::min(inputs.source[3], 1.0 - inputs.destination[3]);
+        case source_alpha_saturated:
+            return channel == 3 ? 1.0 : std::min(inputs.source[3], 1.0 - inputs.destination[3]);
         case source1_color: return inputs.source1[channel];
         case one_minus_source1_color: return 1.0 - inputs.source1[channel];
         case source1_alpha: return inputs.source1[3];
@@ -137,20 +139,22 @@ double blend_channel(BlendOperation operation, BlendFactor source_factor, BlendF
 }
 
 double in_target_range(rhi::FormatKind kind, double value) {
-    if (kind == rhi::FormatKind::unorm || kind == rhi::FormatKind::srgb) return value > 0.0 ? std::min(value, 1.0) : 0.0;
+    if (kind == rhi::FormatKind::unorm || kind == rhi::FormatKind::srgb)
+        return value > 0.0 ? std::min(value, 1.0) : 0.0;
     if (kind == rhi::FormatKind::snorm) return value == value ? std::clamp(value, -1.0, 1.0) : 0.0;
     return value;
 }
 
 }  // namespace
 
-void set_up_double_primitive(const DrawPlan& draw, DepthLayout layout, const Record& record, const std::byte* vertex_memory,
-                             PrimitiveData& primitive) {
+void set_up_double_primitive(const DrawPlan& draw, DepthLayout layout, const Record& record,
+                             const std::byte* vertex_memory, PrimitiveData& primitive) {
     DoublePrimitive& made = double_primitive(primitive, draw);
     made.x0 = record.x0, made.y0 = record.y0;
     made.point_x = made.point_y = made.inverse_point_size = 0.0;
     const PlaneSource source = record.source();
-    const bool is_triangle = source == PlaneSource::window || source == PlaneSource::homogeneous || source == PlaneSource::snapped;
+    const bool is_triangle =
+        source == PlaneSource::window || source == PlaneSource::homogeneous || source == PlaneSource::snapped;
     Corner corners[3];
     corners[0] = corners[1] = corners[2] = corner_of(draw, vertex_memory, record.vertex[0]);
     if (source != PlaneSource::point) corners[1] = corners[2] = corner_of(draw, vertex_memory, record.vertex[1]);
@@ -161,10 +165,11 @@ void set_up_double_primitive(const DrawPlan& draw, DepthLayout layout, const Rec
         case PlaneSource::snapped: {
             const int second = record.bits & Record::swapped ? 2 : 1, third = 3 - second;
             constexpr double unit = 1.0 / subpixels;
-            planes_by_slopes(draw, corners, corners[0],
-                             triangle_weights((record.x[second] - record.x[0]) * unit, (record.y[second] - record.y[0]) * unit,
-                                              (record.x[third] - record.x[0]) * unit, (record.y[third] - record.y[0]) * unit),
-                             made);
+            planes_by_slopes(
+                draw, corners, corners[0],
+                triangle_weights((record.x[second] - record.x[0]) * unit, (record.y[second] - record.y[0]) * unit,
+                                 (record.x[third] - record.x[0]) * unit, (record.y[third] - record.y[0]) * unit),
+                made);
             break;
         }
         case PlaneSource::line:
@@ -192,25 +197,29 @@ void set_up_double_primitive(const DrawPlan& draw, DepthLayout layout, const Rec
 }
 
 double depth_at(const DoublePrimitive& primitive, double x, double y) {
-    return primitive.planes[0].c + primitive.planes[0].dx * (x - primitive.x0) + primitive.planes[0].dy * (y - primitive.y0);
+    return primitive.planes[0].c + primitive.planes[0].dx * (x - primitive.x0) +
+           primitive.planes[0].dy * (y - primitive.y0);
 }
 
 void store_depth(const TargetSet& targets, std::uint32_t sample, std::int32_t x, std::int32_t y, double depth) {
     if (!targets.depth_shadow) return;
     const std::uint32_t texel_bytes = targets.depth_layout == DepthLayout::unorm16 ? 2 : 4;
-    const std::uint64_t texel = (sample * targets.depth_sample_stride + std::uint64_t{targets.depth_row_stride} * static_cast<std::uint32_t>(y)) /
+    const std::uint64_t texel = (sample * targets.depth_sample_stride +
+                                 std::uint64_t{targets.depth_row_stride} * static_cast<std::uint32_t>(y)) /
                                     texel_bytes +
                                 static_cast<std::uint32_t>(x);
     targets.depth_shadow[texel * 4] = depth;
 }
 
-void write_double_colors(const DrawPlan& draw, const ColorPlan& plan, const ColorTarget& target, const FragmentBatch& batch,
-                         std::uint32_t sample, std::uint32_t mask) {
+void write_double_colors(const DrawPlan& draw, const ColorPlan& plan, const ColorTarget& target,
+                         const FragmentBatch& batch, std::uint32_t sample, std::uint32_t mask) {
     const rhi::FormatKind kind = rhi::info(target.format).kind;
     for (std::uint32_t rest = mask; rest != 0; rest &= rest - 1) {
         const auto lane = static_cast<std::uint32_t>(__builtin_ctz(rest));
-        const auto x = static_cast<std::uint32_t>(batch.x[lane / 4]) + (lane & 1), y = static_cast<std::uint32_t>(batch.y[lane / 4]) + (lane >> 1 & 1);
-        const std::uint64_t offset = sample * target.sample_stride + std::uint64_t{y} * target.row_stride + std::uint64_t{x} * target.texel_bytes;
+        const auto x = static_cast<std::uint32_t>(batch.x[lane / 4]) + (lane & 1),
+                   y = static_cast<std::uint32_t>(batch.y[lane / 4]) + (lane >> 1 & 1);
+        const std::uint64_t offset = sample * target.sample_stride + std::uint64_t{y} * target.row_stride +
+                                     std::uint64_t{x} * target.texel_bytes;
         std::byte* const texel = target.data + offset;
         double* const shadow = target.shadow + offset / target.texel_bytes * 4;
         const auto color_of = [&](std::uint32_t output, std::uint32_t components) {

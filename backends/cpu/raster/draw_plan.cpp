@@ -144,7 +144,7 @@ TargetSet target_set(const RenderTargets& targets) {
     for (std::uint32_t i = 0; i < set.color_count; ++i) {
         const ImageView& view = targets.colors[i];
         const ImageLevel& level = view.levels[0];
-        set.colors[i] = {level.data, level.sample_stride, level.row_stride, rhi::info(view.format).block_bytes,
+        set.colors[i] = {level.data,  level.sample_stride, level.row_stride, rhi::info(view.format).block_bytes,
                          view.format, level.shadow};
     }
     const ImageView& view = targets.depth_stencil;
@@ -185,7 +185,8 @@ void plan_draw(const DrawState& state, const DrawCall& call, const TargetSet& ta
     const std::size_t inputs = std::min(pipeline.fragment.inputs.size(), pipeline.input_slots.size());
     queued.row_count = static_cast<std::uint32_t>((inputs + 3) / 4 * 4);
     queued.vertex_bytes = static_cast<std::uint32_t>(sizeof(ScreenVertex)) + queued.row_count * 4;
-    if (pipeline.vertex.in_double) queued.vertex_bytes += (4 + queued.row_count) * static_cast<std::uint32_t>(sizeof(double));
+    if (pipeline.vertex.in_double)
+        queued.vertex_bytes += (4 + queued.row_count) * static_cast<std::uint32_t>(sizeof(double));
     queued.input_masks.assign(static_cast<std::size_t>(queued.row_count) * 2, 0);
     for (std::size_t i = 0; i < inputs; ++i) {
         const Interpolation interpolation = pipeline.fragment.inputs[i].interpolation;
@@ -204,7 +205,8 @@ void plan_draw(const DrawState& state, const DrawCall& call, const TargetSet& ta
     plan.primitive_bytes = static_cast<std::uint32_t>(sizeof(PrimitiveData) + queued.row_count * sizeof(Plane));
     plan.in_double = pipeline.vertex.in_double;
     if (plan.in_double)
-        plan.primitive_bytes += static_cast<std::uint32_t>(sizeof(DoublePrimitive) + queued.row_count * sizeof(DoublePlane));
+        plan.primitive_bytes +=
+            static_cast<std::uint32_t>(sizeof(DoublePrimitive) + queued.row_count * sizeof(DoublePlane));
     plan.depth_bias = pipeline.depth_stencil.depth_bias;
     plan.depth_bias_slope = pipeline.depth_stencil.depth_bias_slope;
     plan.depth_bias_clamp = pipeline.depth_stencil.depth_bias_clamp;

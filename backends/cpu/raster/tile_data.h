@@ -178,7 +178,8 @@ struct DrawPlan {
 };
 
 /// Vulkan specification, "Depth Bias Computation".
-double depth_bias(DepthLayout layout, float constant, float slope_factor, float clamp, double slope, double largest_depth);
+double depth_bias(DepthLayout layout, float constant, float slope_factor, float clamp, double slope,
+                  double largest_depth);
 
 inline constexpr std::uint32_t stream_quads = 16;
 inline constexpr std::uint32_t stream_batches = stream_quads;  ///< Of one quad each, with four lanes.

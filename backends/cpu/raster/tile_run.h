@@ -435,14 +435,19 @@ struct TileRun {
         if (depth) {
             alignas(64) float z[16];
             if (draw->in_double) {
-                const float offset_x = targets.samples == 1 ? 0.5f : static_cast<float>(sample_offset_x[sample]) / subpixels;
-                const float offset_y = targets.samples == 1 ? 0.5f : static_cast<float>(sample_offset_y[sample]) / subpixels;
+                const float offset_x =
+                    targets.samples == 1 ? 0.5f : static_cast<float>(sample_offset_x[sample]) / subpixels;
+                const float offset_y =
+                    targets.samples == 1 ? 0.5f : static_cast<float>(sample_offset_y[sample]) / subpixels;
                 for (std::uint32_t lane = 0; lane < 16; ++lane) {
                     const std::uint32_t quad = lane / 4 < quads ? lane / 4 : 0;
-                    const double x = batch.x[quad] + static_cast<std::int32_t>(lane & 1) + static_cast<double>(offset_x);
-                    const double y = batch.y[quad] + static_cast<std::int32_t>(lane >> 1 & 1) + static_cast<double>(offset_y);
-                    const double exact = draw->writes_depth ? batch.doubles->depth[lane]
-                                                            : raster::depth_at(double_primitive(*batch.primitives[quad], *draw), x, y);
+                    const double x =
+                        batch.x[quad] + static_cast<std::int32_t>(lane & 1) + static_cast<double>(offset_x);
+                    const double y =
+                        batch.y[quad] + static_cast<std::int32_t>(lane >> 1 & 1) + static_cast<double>(offset_y);
+                    const double exact = draw->writes_depth
+                                             ? batch.doubles->depth[lane]
+                                             : raster::depth_at(double_primitive(*batch.primitives[quad], *draw), x, y);
                     keep_depth(exact, exact_depths[lane], z[lane]);
                 }
             } else if (draw->writes_depth) {

@@ -147,7 +147,8 @@ void run_vertices(const Segment& segment, const QueuedDraw& draw, const Kernels&
             finish.setup = scratch.setup.data() + done;
             kernels.finish_vertices(finish);
             for (std::uint32_t lane = 0; batch.doubles && lane < batch.count; ++lane) {
-                auto& vertex = *reinterpret_cast<ScreenVertex*>(finish.vertices + std::size_t{lane} * draw.vertex_bytes);
+                auto& vertex =
+                    *reinterpret_cast<ScreenVertex*>(finish.vertices + std::size_t{lane} * draw.vertex_bytes);
                 double* const to = vertex_doubles(vertex, draw.row_count);
                 for (std::size_t axis = 0; axis < 4; ++axis)
                     to[axis] = batch.doubles[(slot_position + axis) * max_lanes + lane];

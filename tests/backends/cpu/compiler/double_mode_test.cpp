@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Devices in double precision ("cpu:double"), against closed forms in double: registers, buffers, workgroup memory, images,
-// vertex outputs and planes hold doubles, and what goes through single precision does so and no more.
+// Devices in double precision ("cpu:double"), against closed forms in double: registers, buffers, workgroup memory,
+// images, vertex outputs and planes hold doubles, and what goes through single precision does so and no more.
+#include <gtest/gtest.h>
+
 #include <array>
 #include <bit>
 #include <cmath>
@@ -10,8 +12,6 @@
 #include <stdexcept>
 #include <string>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 #include "rhi/device.h"
 #include "rhi/shader_compiler.h"
@@ -47,9 +47,10 @@ class Bench {
         return ok(device_->create_compute_pipeline({.shader = shader("test.comp", body), .name = "test"}));
     }
     Buffer storage(std::uint64_t bytes) {
-        return ok(device_->create_buffer({.size = bytes, .usage = BufferUsage::storage | BufferUsage::copy_source | BufferUsage::copy_destination |
-                                                     BufferUsage::vertex,
-                                            .name = "storage"}));
+        return ok(device_->create_buffer({.size = bytes,
+                                          .usage = BufferUsage::storage | BufferUsage::copy_source |
+                                                   BufferUsage::copy_destination | BufferUsage::vertex,
+                                          .name = "storage"}));
     }
     BindGroup group(auto pipeline, std::vector<BindGroupEntry> entries) {
         return ok(device_->create_bind_group(
@@ -116,13 +117,21 @@ TEST(DoubleMode, FunctionsAreThoseOfDoublePrecision) {
         {"inversesqrt(x)", [](double x) { return 1 / std::sqrt(x); }},
         {"log2(x)", [](double x) { return std::log2(x); }},
         {"atan(x, 3.0)", [](double x) { return std::atan2(x, 3.0); }},
-        {"smoothstep(0.0, 100.0, x)", [](double x) { const double t = x / 100; return t * t * (3 - 2 * t); }},
+        {"smoothstep(0.0, 100.0, x)",
+         [](double x) {
+             const double t = x / 100;
+             return t * t * (3 - 2 * t);
+         }},
         {"length(vec3(x, 1.0, 2.0))", [](double x) { return std::sqrt(x * x + 5); }},
         {"normalize(vec3(x, 1.0, 2.0)).x", [](double x) { return x / std::sqrt(x * x + 5); }},
         {"dot(vec2(x), vec2(0.1, x))", [](double x) { return x * static_cast<double>(0.1f) + x * x; }},
         {"inverse(mat2(x, 1.0, 2.0, x))[0].x", [](double x) { return x / (x * x - 2); }},
         {"mod(x, 0.75)", [](double x) { return x - 0.75 * std::floor(x / 0.75); }},
-        {"mix(x, 7.0, 0.3)", [](double x) { const double a = static_cast<double>(0.3f); return x * (1 - a) + 7 * a; }},
+        {"mix(x, 7.0, 0.3)",
+         [](double x) {
+             const double a = static_cast<double>(0.3f);
+             return x * (1 - a) + 7 * a;
+         }},
         {"fract(x)", [](double x) { return x - std::floor(x); }},
         {"float(uint(x * 1000.0)) / 3.0", [](double x) { return std::trunc(x * 1000) / 3; }},
         {"subgroupShuffleXor(x, 0)", [](double x) { return x; }},
@@ -140,7 +149,8 @@ TEST(DoubleMode, FunctionsAreThoseOfDoublePrecision) {
         for (std::size_t i = 0; i < count; ++i)
             for (int at = 0; at < 64; ++at) {
                 const double expected = functions[i].expected((at + 1.5) / 3);
-                EXPECT_NEAR(found[64 * i + static_cast<std::size_t>(at)], expected, 4e-15 * std::max(1.0, std::abs(expected)))
+                EXPECT_NEAR(found[64 * i + static_cast<std::size_t>(at)], expected,
+                            4e-15 * std::max(1.0, std::abs(expected)))
                     << functions[i].glsl << " at " << at << " on " << backend;
             }
     }
@@ -157,11 +167,12 @@ TEST(DoubleMode, BuffersKeepDoublesBetweenDispatches) {
     CommandList list = bench.device().create_command_list("copy");
     list.copy_buffer(values, 0, copied, 0, 64 * 16);
     bench.run(std::move(list));
-    bench.dispatch(prelude + result + block +
-                       "layout(set = 0, binding = 1) buffer Values { Part parts[]; };\n"
-                       "void main() { vec3 v = parts[63u - at].v; int n = parts[63u - at].n;\n"
-                       "result[3 * n] = exactly(v.x); result[3 * n + 1] = exactly(v.y); result[3 * n + 2] = exactly(v.z); }\n",
-                   {{.binding = 0, .buffer = to}, {.binding = 1, .buffer = copied}});
+    bench.dispatch(
+        prelude + result + block +
+            "layout(set = 0, binding = 1) buffer Values { Part parts[]; };\n"
+            "void main() { vec3 v = parts[63u - at].v; int n = parts[63u - at].n;\n"
+            "result[3 * n] = exactly(v.x); result[3 * n + 1] = exactly(v.y); result[3 * n + 2] = exactly(v.z); }\n",
+        {{.binding = 0, .buffer = to}, {.binding = 1, .buffer = copied}});
     const auto found = bench.read<double>(to, 64 * 3);
     for (int at = 0; at < 64; ++at)
         for (int c = 0; c < 3; ++c)
@@ -175,15 +186,17 @@ TEST(DoubleMode, WhatTheHostWritesHidesOlderDoubles) {
     Bench bench("cpu:double");
     const Buffer values = bench.storage(64 * 4), to = bench.storage(64 * 8);
     const std::string block = "layout(set = 0, binding = 1) buffer Values { float values[]; };\n";
-    bench.dispatch(prelude + block + "void main() { values[at] = 1.0 / float(at + 3u); }\n", {{.binding = 1, .buffer = values}});
+    bench.dispatch(prelude + block + "void main() { values[at] = 1.0 / float(at + 3u); }\n",
+                   {{.binding = 1, .buffer = values}});
     std::vector<float> host(64, 0.1f);
     Bench::ok(bench.device().write_buffer(values, std::as_bytes(std::span(host))));
     const std::string show = prelude + result + block + "void main() { result[at] = exactly(values[at]); }\n";
     bench.dispatch(show, {{.binding = 0, .buffer = to}, {.binding = 1, .buffer = values}});
     EXPECT_EQ(bench.read<double>(to, 64)[5], static_cast<double>(0.1f));
     // And what a shader writes as an integer.
-    bench.dispatch(prelude + "layout(set = 0, binding = 1) buffer Values { uint values[]; };\n"
-                             "void main() { values[at] = floatBitsToUint(0.3); }\n",
+    bench.dispatch(prelude +
+                       "layout(set = 0, binding = 1) buffer Values { uint values[]; };\n"
+                       "void main() { values[at] = floatBitsToUint(0.3); }\n",
                    {{.binding = 1, .buffer = values}});
     bench.dispatch(show, {{.binding = 0, .buffer = to}, {.binding = 1, .buffer = values}});
     EXPECT_EQ(bench.read<double>(to, 64)[5], static_cast<double>(0.3f));
@@ -197,7 +210,8 @@ TEST(DoubleMode, WorkgroupMemoryAndArraysKeepDoubles) {
                        "void main() { parts[at] = 1.0 / float(at + 3u); places[at] = int(at);\n"
                        "float own[8]; int number[8];\n"
                        "barrier();\n"
-                       "for (int i = 0; i < 8; ++i) { own[i] = parts[(at + uint(i)) % 64u]; number[i] = places[(at + uint(i)) % 64u]; }\n"
+                       "for (int i = 0; i < 8; ++i) { own[i] = parts[(at + uint(i)) % 64u]; number[i] = places[(at + "
+                       "uint(i)) % 64u]; }\n"
                        "int k = int(at % 8u);\n"
                        "result[at] = exactly(own[k] + float(number[k])); }\n",
                    {{.binding = 0, .buffer = to}});
@@ -227,29 +241,32 @@ TEST(DoubleMode, BitsPackingAndAtomicsGoThroughSinglePrecision) {
 }
 
 Texture make_texture(Bench& bench, Format format, TextureUsage usage, std::uint32_t size = 64, std::uint32_t mips = 1) {
-    return Bench::ok(bench.device().create_texture({.format = format, .width = size, .height = size, .mips = mips, .usage = usage, .name = "texture"}));
+    return Bench::ok(bench.device().create_texture(
+        {.format = format, .width = size, .height = size, .mips = mips, .usage = usage, .name = "texture"}));
 }
 
 TEST(DoubleMode, StorageImagesKeepDoublesAndSamplingFiltersThem) {
     Bench bench("cpu:double");
-    for (const auto& [format, name] : {std::pair{Format::rgba16_float, "rgba16f"}, std::pair{Format::rgba8_unorm, "rgba8"},
-                                       std::pair{Format::r32_float, "r32f"}}) {
+    for (const auto& [format, name] : {std::pair{Format::rgba16_float, "rgba16f"},
+                                       std::pair{Format::rgba8_unorm, "rgba8"}, std::pair{Format::r32_float, "r32f"}}) {
         const Texture image = make_texture(bench, format, TextureUsage::storage | TextureUsage::sampled);
         const Buffer to = bench.storage(64 * 2 * 8);
-        bench.dispatch(prelude + "layout(set = 0, binding = 1, " + name +
-                           ") writeonly uniform image2D image;\n"
-                           "void main() { for (int y = 0; y < 64; ++y)\n"
-                           "imageStore(image, ivec2(at, y), vec4(1.0 / float(at + 3u) / float(y + 1), 0.25, 1.0, 1.0)); }\n",
-                       {{.binding = 1, .texture = image}});
+        bench.dispatch(
+            prelude + "layout(set = 0, binding = 1, " + name +
+                ") writeonly uniform image2D image;\n"
+                "void main() { for (int y = 0; y < 64; ++y)\n"
+                "imageStore(image, ivec2(at, y), vec4(1.0 / float(at + 3u) / float(y + 1), 0.25, 1.0, 1.0)); }\n",
+            {{.binding = 1, .texture = image}});
         const Sampler linear = Bench::ok(bench.device().create_sampler(
             {.address_u = AddressMode::clamp_to_edge, .address_v = AddressMode::clamp_to_edge, .name = "linear"}));
-        bench.dispatch(prelude + result +
-                           "layout(set = 0, binding = 1) uniform texture2D image;\n"
-                           "layout(set = 0, binding = 2) uniform sampler linear;\n"
-                           "void main() { result[2 * at] = exactly(texelFetch(image, ivec2(at, 5), 0).x);\n"
-                           "vec2 place = vec2(float(at) + 0.8, 9.9) / 64.0;\n"
-                           "result[2 * at + 1] = exactly(textureLod(sampler2D(image, linear), place, 0.0).x); }\n",
-                       {{.binding = 0, .buffer = to}, {.binding = 1, .texture = image}, {.binding = 2, .sampler = linear}});
+        bench.dispatch(
+            prelude + result +
+                "layout(set = 0, binding = 1) uniform texture2D image;\n"
+                "layout(set = 0, binding = 2) uniform sampler linear;\n"
+                "void main() { result[2 * at] = exactly(texelFetch(image, ivec2(at, 5), 0).x);\n"
+                "vec2 place = vec2(float(at) + 0.8, 9.9) / 64.0;\n"
+                "result[2 * at + 1] = exactly(textureLod(sampler2D(image, linear), place, 0.0).x); }\n",
+            {{.binding = 0, .buffer = to}, {.binding = 1, .texture = image}, {.binding = 2, .sampler = linear}});
         const auto found = bench.read<double>(to, 64 * 2);
         const auto value = [](int x, int y) { return 1.0 / (std::min(x, 63) + 3.0) / (y + 1.0); };
         const double fx = static_cast<double>(0.8f) - 0.5, fy = static_cast<double>(9.9f) - 9.5;
@@ -265,7 +282,8 @@ TEST(DoubleMode, StorageImagesKeepDoublesAndSamplingFiltersThem) {
 TEST(DoubleMode, CodesOfTexturesAreExactInDouble) {
     Bench bench("cpu:double");
     const TextureUsage usage = TextureUsage::sampled | TextureUsage::copy_destination;
-    const Texture unorm = make_texture(bench, Format::rgba8_unorm, usage), srgb = make_texture(bench, Format::rgba8_srgb, usage);
+    const Texture unorm = make_texture(bench, Format::rgba8_unorm, usage),
+                  srgb = make_texture(bench, Format::rgba8_srgb, usage);
     std::vector<std::uint8_t> codes(64 * 64 * 4);
     for (std::size_t i = 0; i < codes.size(); ++i) codes[i] = static_cast<std::uint8_t>(i / 4 % 256);
     Bench::ok(bench.device().write_texture(unorm, std::as_bytes(std::span(codes))));
@@ -277,12 +295,15 @@ TEST(DoubleMode, CodesOfTexturesAreExactInDouble) {
                        "void main() { ivec2 place = ivec2(at % 64u, at / 64u);\n"
                        "result[2 * at] = exactly(texelFetch(codes, place, 0).x);\n"
                        "result[2 * at + 1] = exactly(texelFetch(curved, place, 0).x); }\n",
-                   {{.binding = 0, .buffer = to}, {.binding = 1, .texture = unorm}, {.binding = 2, .texture = srgb}}, 4);
+                   {{.binding = 0, .buffer = to}, {.binding = 1, .texture = unorm}, {.binding = 2, .texture = srgb}},
+                   4);
     const auto found = bench.read<double>(to, 256 * 2);
     for (int code = 0; code < 256; ++code) {
         const double c = code / 255.0;
         EXPECT_DOUBLE_EQ(found[static_cast<std::size_t>(2 * code)], c);
-        EXPECT_DOUBLE_EQ(found[static_cast<std::size_t>(2 * code + 1)], c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4)) << code;
+        EXPECT_DOUBLE_EQ(found[static_cast<std::size_t>(2 * code + 1)],
+                         c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4))
+            << code;
     }
 }
 
@@ -290,16 +311,22 @@ TEST(DoubleMode, CodesOfTexturesAreExactInDouble) {
 class Picture {
   public:
     static constexpr std::uint32_t size = 16;
-    explicit Picture(Bench& bench, Format format = Format::rgba32_float, std::uint32_t samples = 1) : bench_(bench), samples_(samples) {
+    explicit Picture(Bench& bench, Format format = Format::rgba32_float, std::uint32_t samples = 1)
+        : bench_(bench), samples_(samples) {
         const TextureUsage usage = TextureUsage::color_target | TextureUsage::sampled;
         target_ = make_texture(bench, format, usage, size);
         depth_ = make_texture(bench, Format::d32_float, TextureUsage::depth_target | TextureUsage::sampled, size);
         if (samples == 1) return;
-        many_ = Bench::ok(bench.device().create_texture(
-            {.format = format, .width = size, .height = size, .samples = samples, .usage = TextureUsage::color_target, .name = "many"}));
+        many_ = Bench::ok(bench.device().create_texture({.format = format,
+                                                         .width = size,
+                                                         .height = size,
+                                                         .samples = samples,
+                                                         .usage = TextureUsage::color_target,
+                                                         .name = "many"}));
     }
 
-    void draw(GraphicsPipelineDesc desc, const std::string& vertex, const std::string& fragment, std::uint32_t draws, Buffer vertices = {}) {
+    void draw(GraphicsPipelineDesc desc, const std::string& vertex, const std::string& fragment, std::uint32_t draws,
+              Buffer vertices = {}) {
         desc.vertex = bench_.shader("test.vert", vertex), desc.fragment = bench_.shader("test.frag", fragment);
         desc.samples = samples_;
         const bool has_depth = desc.depth_stencil.format != Format::undefined;
@@ -340,24 +367,27 @@ TEST(DoubleMode, ValuesBetweenTheStagesAreInterpolatedInDouble) {
     Picture picture(bench);
     GraphicsPipelineDesc desc;
     desc.color_targets = {{.format = Format::rgba32_float}};
-    desc.depth_stencil = {.format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::less};
+    desc.depth_stencil = {
+        .format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::less};
     // A triangle that covers all pixels, with a different w at each vertex.
-    picture.draw(desc,
-                 "layout(location = 0) out float perspective;\n"
-                 "layout(location = 1) noperspective out float linear;\n"
-                 "layout(location = 2) flat out float constant;\n"
-                 "layout(location = 3) flat out int number;\n"
-                 "void main() { vec2 corner = vec2(gl_VertexIndex == 1 ? 7.0 : -1.0, gl_VertexIndex == 2 ? 7.0 : -1.0);\n"
-                 "float w = float(gl_VertexIndex + 1);\n"
-                 "perspective = 1.0 / float(gl_VertexIndex + 3); linear = perspective; constant = perspective; number = gl_VertexIndex + 5;\n"
-                 "gl_Position = vec4(corner * w, w / float(gl_VertexIndex + 3), w); }\n",
-                 "layout(location = 0) in float perspective;\n"
-                 "layout(location = 1) noperspective in float linear;\n"
-                 "layout(location = 2) flat in float constant;\n"
-                 "layout(location = 3) flat in int number;\n"
-                 "layout(location = 0) out vec4 color;\n"
-                 "void main() { color = vec4(perspective, linear, gl_FragCoord.z, constant + float(number)); }\n",
-                 1);
+    picture.draw(
+        desc,
+        "layout(location = 0) out float perspective;\n"
+        "layout(location = 1) noperspective out float linear;\n"
+        "layout(location = 2) flat out float constant;\n"
+        "layout(location = 3) flat out int number;\n"
+        "void main() { vec2 corner = vec2(gl_VertexIndex == 1 ? 7.0 : -1.0, gl_VertexIndex == 2 ? 7.0 : -1.0);\n"
+        "float w = float(gl_VertexIndex + 1);\n"
+        "perspective = 1.0 / float(gl_VertexIndex + 3); linear = perspective; constant = perspective; number = "
+        "gl_VertexIndex + 5;\n"
+        "gl_Position = vec4(corner * w, w / float(gl_VertexIndex + 3), w); }\n",
+        "layout(location = 0) in float perspective;\n"
+        "layout(location = 1) noperspective in float linear;\n"
+        "layout(location = 2) flat in float constant;\n"
+        "layout(location = 3) flat in int number;\n"
+        "layout(location = 0) out vec4 color;\n"
+        "void main() { color = vec4(perspective, linear, gl_FragCoord.z, constant + float(number)); }\n",
+        1);
     const std::vector<double> found = picture.texels(), depths = picture.texels(true);
     for (std::uint32_t y = 0; y < 16; ++y)
         for (std::uint32_t x = 0; x < 16; ++x) {
@@ -365,7 +395,8 @@ TEST(DoubleMode, ValuesBetweenTheStagesAreInterpolatedInDouble) {
             const double b1 = (nx + 1) / 8, b2 = (ny + 1) / 8, b0 = 1 - b1 - b2;
             const double values[3] = {1.0 / 3, 1.0 / 4, 1.0 / 5};
             const double linear = b0 * values[0] + b1 * values[1] + b2 * values[2];
-            const double numerator = b0 * values[0] + b1 * values[1] / 2 + b2 * values[2] / 3, denominator = b0 + b1 / 2 + b2 / 3;
+            const double numerator = b0 * values[0] + b1 * values[1] / 2 + b2 * values[2] / 3,
+                         denominator = b0 + b1 / 2 + b2 / 3;
             const std::size_t at = (y * 16 + x) * 4;
             EXPECT_NEAR(found[at], numerator / denominator, 1e-14) << x << " " << y;
             EXPECT_NEAR(found[at + 1], linear, 1e-14) << x << " " << y;
@@ -381,7 +412,8 @@ TEST(DoubleMode, VerticesThatShadersWroteKeepTheirDoubles) {
     bench.dispatch(prelude +
                        "layout(set = 0, binding = 0) buffer Vertices { vec4 vertices[]; };\n"
                        // Constant expressions are computed in single precision, long before any device sees them.
-                       "void main() { float zero = float(gl_NumWorkGroups.x - 1u); if (at < 3u) vertices[at] = vec4(at == 1u ? 3.0 : -1.0, at == 2u ? 3.0 : -1.0, 1.0 / (3.0 + zero), 1.0 / (7.0 + zero)); }\n",
+                       "void main() { float zero = float(gl_NumWorkGroups.x - 1u); if (at < 3u) vertices[at] = vec4(at "
+                       "== 1u ? 3.0 : -1.0, at == 2u ? 3.0 : -1.0, 1.0 / (3.0 + zero), 1.0 / (7.0 + zero)); }\n",
                    {{.binding = 0, .buffer = vertices}});
     Picture picture(bench);
     GraphicsPipelineDesc desc;
@@ -407,14 +439,22 @@ TEST(DoubleMode, BlendingAddsDoublesWhateverTheFormat) {
             Picture picture(bench, format, samples);
             GraphicsPipelineDesc desc;
             desc.color_targets = {{.format = format,
-                                   .blend = {.enabled = true, .source_color = BlendFactor::source_alpha, .destination_color = BlendFactor::one},
+                                   .blend = {.enabled = true,
+                                             .source_color = BlendFactor::source_alpha,
+                                             .destination_color = BlendFactor::one},
                                    .write_mask = 7}};
-            picture.draw(desc, "void main() { gl_Position = vec4(gl_VertexIndex == 1 ? 3.0 : -1.0, gl_VertexIndex == 2 ? 3.0 : -1.0, 0.0, 1.0); }\n",
-                         "layout(location = 0) out vec4 color; void main() { color = vec4(1.0 / (3.0 + gl_FragCoord.z), gl_FragCoord.x / 300.0, 0.0, 0.1); }\n", 7);
+            picture.draw(desc,
+                         "void main() { gl_Position = vec4(gl_VertexIndex == 1 ? 3.0 : -1.0, gl_VertexIndex == 2 ? 3.0 "
+                         ": -1.0, 0.0, 1.0); }\n",
+                         "layout(location = 0) out vec4 color; void main() { color = vec4(1.0 / (3.0 + "
+                         "gl_FragCoord.z), gl_FragCoord.x / 300.0, 0.0, 0.1); }\n",
+                         7);
             const auto found = picture.texels();
             for (std::size_t x = 0; x < 16; ++x) {
-                EXPECT_NEAR(found[4 * x], 7.0 / 3 * static_cast<double>(0.1f), 1e-14) << rhi::info(format).name << " " << samples;
-                EXPECT_NEAR(found[4 * x + 1], 7 * (static_cast<double>(x) + 0.5) / 300 * static_cast<double>(0.1f), 1e-14);
+                EXPECT_NEAR(found[4 * x], 7.0 / 3 * static_cast<double>(0.1f), 1e-14)
+                    << rhi::info(format).name << " " << samples;
+                EXPECT_NEAR(found[4 * x + 1], 7 * (static_cast<double>(x) + 0.5) / 300 * static_cast<double>(0.1f),
+                            1e-14);
                 EXPECT_EQ(found[4 * x + 3], 0.0);
             }
         }
@@ -423,22 +463,24 @@ TEST(DoubleMode, BlendingAddsDoublesWhateverTheFormat) {
 TEST(DoubleMode, MipsAreAveragesOfDoubles) {
     Bench bench("cpu:double");
     const Texture image = make_texture(bench, Format::rgba8_unorm,
-                                       TextureUsage::storage | TextureUsage::sampled | TextureUsage::copy_source | TextureUsage::copy_destination |
-                                           TextureUsage::color_target,
+                                       TextureUsage::storage | TextureUsage::sampled | TextureUsage::copy_source |
+                                           TextureUsage::copy_destination | TextureUsage::color_target,
                                        16, 3);
-    bench.dispatch(prelude +
-                       "layout(set = 0, binding = 1, rgba8) writeonly uniform image2D image;\n"
-                       "void main() { if (at < 16u) for (int y = 0; y < 16; ++y)\n"
-                       "imageStore(image, ivec2(at, y), vec4(1.0 / float(at + 3u) / float(y + 1), 0.25, 1.0, 1.0)); }\n",
-                   {{.binding = 1, .texture = TextureView::subresource(image, 0)}});
+    bench.dispatch(
+        prelude +
+            "layout(set = 0, binding = 1, rgba8) writeonly uniform image2D image;\n"
+            "void main() { if (at < 16u) for (int y = 0; y < 16; ++y)\n"
+            "imageStore(image, ivec2(at, y), vec4(1.0 / float(at + 3u) / float(y + 1), 0.25, 1.0, 1.0)); }\n",
+        {{.binding = 1, .texture = TextureView::subresource(image, 0)}});
     CommandList list = bench.device().create_command_list("mips");
     list.generate_mips(image);
     bench.run(std::move(list));
     const Buffer to = bench.storage(64 * 8);
-    bench.dispatch(prelude + result +
-                       "layout(set = 0, binding = 1) uniform texture2D image;\n"
-                       "void main() { if (at < 16u) result[at] = exactly(texelFetch(image, ivec2(at % 4u, at / 4u), 2).x); }\n",
-                   {{.binding = 0, .buffer = to}, {.binding = 1, .texture = image}});
+    bench.dispatch(
+        prelude + result +
+            "layout(set = 0, binding = 1) uniform texture2D image;\n"
+            "void main() { if (at < 16u) result[at] = exactly(texelFetch(image, ivec2(at % 4u, at / 4u), 2).x); }\n",
+        {{.binding = 0, .buffer = to}, {.binding = 1, .texture = image}});
     const auto found = bench.read<double>(to, 16);
     for (std::size_t at = 0; at < 16; ++at) {
         double sum = 0;
