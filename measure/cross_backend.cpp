@@ -113,7 +113,7 @@ void find_origin(const Contestant& reference, const Contestant& test, BackendRes
             fmt::format("'{}' made the texel in double precision, '{}' in single precision", from->shader, to->shader);
         return;
     }
-    result.origin = find_error_origin(*from, *to);
+    result.origin = find_error_origin(*from, *to, largest->largest.stored);
     if (!result.origin)
         result.no_origin = fmt::format(
             "both precisions compute the same in '{}' up to where they part: another surface is seen", to->shader);

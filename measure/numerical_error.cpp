@@ -18,7 +18,8 @@ class Sum {
   public:
     Sum(NumericalError& total, std::uint32_t layer, std::uint32_t mip) : total_(total), layer_(layer), mip_(mip) {}
 
-    void add(std::uint32_t x, std::uint32_t y, const std::string& name, double reference, double value, double error) {
+    void add(std::uint32_t x, std::uint32_t y, const std::string& name, double reference, double value, double error,
+             std::optional<double> stored = {}) {
         if (!std::isfinite(reference) && !std::isfinite(value)) return;
         if (!std::isfinite(error)) error = std::numeric_limits<double>::infinity();
         const double magnitude = std::max(std::abs(reference), std::abs(value));
@@ -27,7 +28,7 @@ class Sum {
         ++total_.values;
         if (std::isfinite(reference)) total_.largest_value = std::max(total_.largest_value, std::abs(reference));
         if (magnitude > 0.0) total_.max_rel = std::max(total_.max_rel, error / magnitude);
-        if (error > total_.largest.error) total_.largest = {x, y, layer_, mip_, name, reference, value, error};
+        if (error > total_.largest.error) total_.largest = {x, y, layer_, mip_, name, reference, value, stored.value_or(value), error};
     }
 
   private:
@@ -95,13 +96,13 @@ Expected<void> add_numerical_error(const TextureData& reference, const TextureDa
                 if (field.kind == FieldKind::octahedral) {
                     double from[3], to[3];
                     decode_octahedral(field, a, from), decode_octahedral(field, b, to);
-                    total.add(x, y, field.name, 1.0, 1.0, angle_between(from, to));
+                    total.add(x, y, field.name, 1.0, 1.0, angle_between(from, to), static_cast<std::int32_t>(b));
                     continue;
                 }
                 const double from = decode_field(field, a), to = decode_field(field, b);
                 double error = std::abs(from - to);
                 if (field.kind == FieldKind::circular) error = std::min(error, 1.0 - error);
-                total.add(x, y, field.name, from, to, error);
+                total.add(x, y, field.name, from, to, error, static_cast<std::int32_t>(b));
             }
             continue;
         }
@@ -117,7 +118,8 @@ Expected<void> add_numerical_error(const TextureData& reference, const TextureDa
     return {};
 }
 
-std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& reference, const rhi::InvocationTrace& test) {
+std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& reference, const rhi::InvocationTrace& test,
+                                             std::optional<double> stored) {
     // Instructions are the same in both; events are until the two part.
     const std::size_t common = std::min(reference.events.size(), test.events.size());
     std::size_t end = 0;
@@ -127,12 +129,17 @@ std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& referen
     std::unordered_map<std::uint32_t, std::vector<Pair>> history;
     std::optional<Pair> last;
     std::size_t last_event = 0;
+    double nearest = std::numeric_limits<double>::max();
     for (std::size_t i = 0; i < end; ++i) {
         const rhi::TracedInstruction& instruction = instructions[test.events[i].instruction];
         const Pair pair = pair_of(reference.events[i], test.events[i], i);
         if (instruction.result != 0) history[instruction.result].push_back(pair);
         const bool is_store = instruction.operation == "Store" || instruction.operation == "ImageWrite";
-        if (pair.error > 0.0 && (is_store || !last)) last = pair, last_event = i;
+        double distance = std::numeric_limits<double>::max();
+        for (const double value : test.events[i].values)
+            distance = stored && is_store ? std::min(distance, std::abs(value - *stored)) : distance;
+        if (pair.error > 0.0 && (!last || (is_store && distance <= nearest)))
+            last = pair, last_event = i, nearest = distance;
     }
     if (!last) return std::nullopt;
     const auto before = [&](std::uint32_t value, std::size_t event) -> const Pair* {

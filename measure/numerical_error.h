@@ -23,6 +23,7 @@ struct WrongValue {
     std::string name;        ///< Field of a packed word, or channel: "r".
     double reference = 0.0;  ///< In double precision.
     double value = 0.0;
+    double stored = 0.0;     ///< What the shader stored: `value`, or of packed words the word as a signed integer.
     double error = 0.0;  ///< |value - reference| (radians for octahedral fields, turns for circular ones).
 };
 
@@ -58,6 +59,8 @@ struct ErrorOrigin {
 /// brings most of it (sums and differences take over absolute errors, all others relative ones), and gives the
 /// instruction on this way at which the relative error grows most: from the largest of its operands to its result.
 /// Nothing where both computed the same. Both traces are of one invocation of one shader.
-std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& reference, const rhi::InvocationTrace& test);
+/// @param stored  which of several stores of `test` is meant: that of the nearest number; default: the last
+std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& reference, const rhi::InvocationTrace& test,
+                                             std::optional<double> stored = {});
 
 }  // namespace nacre::measure
