@@ -117,10 +117,12 @@ ReportTable error_table(const BackendResult& result) {
              number_cell(fmt::format("{:.9g}", at.reference)), number_cell(fmt::format("{:.9g}", at.value))});
     }
     if (const NumericalError* const largest = SceneComparison::largest_error(result))
-        table.note += fmt::format(" The largest is that of {} at pixel {}, {}. {}", largest->texture,
-                                  largest->largest.x, largest->largest.y,
-                                  result.origin ? "It begins at " + result.origin->text + "."
-                                                : "Where it begins could not be told: " + result.no_origin);
+        table.note += fmt::format(" The largest is that of {} at pixel {}, {}.", largest->texture, largest->largest.x,
+                                  largest->largest.y);
+    if (!result.no_origin.empty()) table.note += fmt::format(" Where it begins cannot be told: {}", result.no_origin);
+    if (result.origin)
+        table.note += fmt::format(" {} begins at {}.", result.no_origin.empty() ? "It" : "The largest of " + result.origin_of,
+                                  result.origin->text);
     return table;
 }
 

@@ -67,8 +67,8 @@ Error named(Error error, const std::string& backend) {
 }
 
 bool is_more_precise(const Contestant& reference, const Contestant& test) {
-    return reference.device && test.device &&
-           reference.device->capabilities().float_bits > test.device->capabilities().float_bits;
+    return reference.rhi_device && test.rhi_device &&
+           reference.rhi_device->capabilities().float_bits > test.rhi_device->capabilities().float_bits;
 }
 
 // What the invocation that made a texel computed on one device; the last pass that writes the texture counts.
@@ -76,9 +76,9 @@ Expected<rhi::InvocationTrace> trace_texel(const Contestant& contestant, const s
                                            const WrongValue& texel) {
     rhi::TraceRequest request{.shader = pass, .x = texel.x, .y = texel.y, .z = texel.layer};
     const auto run = [&]() -> Expected<rhi::Trace> {
-        NACRE_CHECK(contestant.device->start_trace(request));
+        NACRE_CHECK(contestant.rhi_device->start_trace(request));
         auto frame = contestant.renderer.render_frame();
-        auto trace = contestant.device->finish_trace();
+        auto trace = contestant.rhi_device->finish_trace();
         if (!frame) return std::unexpected(frame.error());
         return trace;
     };
@@ -93,30 +93,41 @@ Expected<rhi::InvocationTrace> trace_texel(const Contestant& contestant, const s
     return std::move(trace.invocations.back());
 }
 
-void find_origin(const Contestant& reference, const Contestant& test, BackendResult& result) {
-    const NumericalError* const largest = SceneComparison::largest_error(result);
-    if (!largest) return;
+Expected<ErrorOrigin> origin_of(const Contestant& reference, const Contestant& test, const NumericalError& error) {
     std::string passes;
     for (const IntermediateDescription& description : test.renderer.intermediates())
-        if (description.name == largest->texture) passes = description.written_by;
+        if (description.name == error.texture) passes = description.written_by;
     const std::size_t comma = passes.rfind(", ");
     std::string last = comma == std::string::npos ? passes : passes.substr(comma + 2);
     std::ranges::replace(last, ' ', '_');  // The folder of the pass, where its shaders are.
-    auto from = trace_texel(reference, last, largest->largest);
-    auto to = from ? trace_texel(test, last, largest->largest) : from;
-    if (!to) {
-        result.no_origin = to.error().message();
-        return;
+    NACRE_TRY(const rhi::InvocationTrace from, trace_texel(reference, last, error.largest));
+    NACRE_TRY(const rhi::InvocationTrace to, trace_texel(test, last, error.largest));
+    const auto untold = [&](std::string reason) {
+        return fail(ErrorCode::not_found, "trace texel", fmt::format("({}, {})", error.largest.x, error.largest.y),
+                    std::move(reason));
+    };
+    if (from.shader != to.shader)
+        return untold(fmt::format("'{}' made it in double precision, '{}' in single precision", from.shader, to.shader));
+    std::optional<ErrorOrigin> origin = find_error_origin(from, to, error.largest.stored);
+    if (!origin)
+        return untold(fmt::format("both precisions compute the same in '{}', up to where they part", to.shader));
+    return *std::move(origin);
+}
+
+void find_origin(const Contestant& reference, const Contestant& test, BackendResult& result) {
+    std::vector<const NumericalError*> ranked;
+    for (const NumericalError& error : result.errors)
+        if (error.largest.error > 0.0) ranked.push_back(&error);
+    std::ranges::stable_sort(ranked, std::ranges::greater{}, &NumericalError::share);
+    for (const NumericalError* error : ranked) {
+        auto origin = origin_of(reference, test, *error);
+        if (origin) {
+            result.origin = *std::move(origin);
+            result.origin_of = error->texture;
+            return;
+        }
+        if (result.no_origin.empty()) result.no_origin = origin.error().message();
     }
-    if (from->shader != to->shader) {
-        result.no_origin =
-            fmt::format("'{}' made the texel in double precision, '{}' in single precision", from->shader, to->shader);
-        return;
-    }
-    result.origin = find_error_origin(*from, *to, largest->largest.stored);
-    if (!result.origin)
-        result.no_origin = fmt::format(
-            "both precisions compute the same in '{}' up to where they part: another surface is seen", to->shader);
 }
 
 // All layers and mips of one texture on two devices.
@@ -252,7 +263,7 @@ Expected<SceneComparison> compare_backends(std::string scene, std::span<const Co
                   compare_pictures(linear_from_srgb_bytes(comparison.backends.front().picture.tone_mapped),
                                    linear_from_srgb_bytes(test.picture.tone_mapped)));
     }
-    if (contestants.front().device) comparison.narrowed = contestants.front().device->narrowed_operations();
+    if (contestants.front().rhi_device) comparison.narrowed = contestants.front().rhi_device->narrowed_operations();
     return comparison;
 }
 
@@ -318,7 +329,7 @@ std::string to_json(const SceneComparison& comparison) {
                         {"values", error.values},
                         {"exact", error.is_exact},
                         {"max_abs", finite(error.largest.error)},
-                        {"max_rel", finite(error.max_rel)},
+                        {"max_rel", finite(error.max_rel)}, {"flips", error.flips},
                         {"rms", finite(error.rms)},
                         {"share", finite(error.share())},
                         {"pixel", {error.largest.x, error.largest.y}},
@@ -331,7 +342,7 @@ std::string to_json(const SceneComparison& comparison) {
         for (const NumericalError& error : result.errors) errors.push_back(error_json(error));
         Json origin = nullptr;
         if (result.origin)
-            origin = Json{{"shader", result.origin->shader},       {"line", result.origin->line},
+            origin = Json{{"texture", result.origin_of}, {"shader", result.origin->shader},       {"line", result.origin->line},
                           {"operation", result.origin->operation}, {"reference", finite(result.origin->reference)},
                           {"value", finite(result.origin->value)}, {"growth", finite(result.origin->growth)}};
         const NumericalError* const largest = SceneComparison::largest_error(result);

@@ -33,7 +33,7 @@ struct Contestant {
     std::string device;   ///< For people.
     passes::Renderer& renderer;
     /// The renderer's, to find out where errors begin; null: that is left out.
-    rhi::Device* device = nullptr;
+    rhi::Device* rhi_device = nullptr;
 };
 
 /// What a texture looked like on both sides, for people.
@@ -59,7 +59,8 @@ struct BackendResult {
     /// of numbers in `textures`, and where the largest of them begins.
     std::vector<NumericalError> errors;
     std::optional<ErrorOrigin> origin;
-    std::string no_origin;  ///< Why there is none.
+    std::string origin_of;  ///< The texture whose error that is: the largest that can be traced.
+    std::string no_origin;  ///< Why it is not the largest of all.
     std::vector<TexturePictures> texture_pictures;
 };
 
@@ -69,7 +70,7 @@ struct SceneComparison {
     /// Of a reference in double precision: what went through single precision all the same.
     std::vector<rhi::NarrowedOperation> narrowed;
 
-    /// The error of `result` that `BackendResult::origin` is about; null where there is none.
+    /// The error of `result` that is the largest part of its texture's largest value; null where there is none.
     [[nodiscard]] static const NumericalError* largest_error(const BackendResult& result);
 };
 

@@ -32,6 +32,9 @@ struct NumericalError {
     std::string texture;
     bool is_exact = false;  ///< The reference was read in doubles; otherwise its values were rounded by their format.
     std::uint64_t values = 0;    ///< Compared.
+    /// Texels of depth textures that show another surface: the value is that of a neighboring texel of the reference, as
+    /// where the edge of a triangle falls on the other side of a pixel. They are no errors of the value, and left out.
+    std::uint64_t flips = 0;
     double largest_value = 0.0;  ///< Magnitude, of the reference.
     double rms = 0.0;
     double max_rel = 0.0;  ///< Largest |value - reference| / max(|value|, |reference|).

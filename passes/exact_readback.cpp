@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "passes/exact_readback.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cstring>
 
 #include "rhi/shader_compiler.h"
@@ -45,6 +48,9 @@ Expected<std::vector<double>> read_exactly(rhi::Device& device, rhi::Texture tex
         return fail(ErrorCode::unsupported, "read texture in double precision", device.adapter().name,
                     "its shaders have no float64", "Read the bits of the texture.");
     NACRE_TRY(const rhi::TextureDesc desc, device.describe(texture));
+    if ((desc.usage & rhi::TextureUsage::sampled) == rhi::TextureUsage::none)
+        return fail(ErrorCode::unsupported, "read texture in double precision", fmt::format("'{}'", desc.name),
+                    "no shader may read it", "Read the bits of the texture, or make it with TextureUsage::sampled.");
     const rhi::Extent3D extent = rhi::mip_extent(desc, mip);
     const std::uint64_t texels = std::uint64_t{extent.width} * extent.height;
     rhi::ShaderCompiler compiler({});

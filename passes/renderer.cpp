@@ -637,7 +637,7 @@ Expected<rhi::Texture> Renderer::find_intermediate(std::string_view name, std::u
     const auto found = std::ranges::find(known, name, &IntermediateDescription::name);
     if (found == known.end()) {
         std::vector<std::string> names;
-        for (const IntermediateDescription& description : known) names.push_back(description.name);
+        for (const IntermediateDescription& one : known) names.push_back(one.name);
         return fail(ErrorCode::not_found, "read intermediate texture", fmt::format("'{}'", name),
                     "no pass of this plan writes a texture of that name",
                     fmt::format("There are {}.", fmt::join(names, ", ")));

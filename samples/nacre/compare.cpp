@@ -40,9 +40,14 @@ std::string error_text(const measure::BackendResult& result) {
     std::string text = table.text();
     if (const measure::NumericalError* const largest = measure::SceneComparison::largest_error(result)) {
         text += fmt::format("Largest: {} at pixel {}, {}.\n", largest->texture, largest->largest.x, largest->largest.y);
-        text += result.origin ? fmt::format("It begins at {}.\n", result.origin->text)
-                              : fmt::format("Where it begins could not be told: {}\n", result.no_origin);
+        if (!result.no_origin.empty()) text += fmt::format("Where it begins cannot be told: {}\n", result.no_origin);
+        if (result.origin)
+            text += fmt::format("{} begins at {}.\n",
+                                result.no_origin.empty() ? "It" : "The largest of " + result.origin_of, result.origin->text);
     }
+    for (const measure::NumericalError& error : result.errors)
+        if (error.flips > 0)
+            text += fmt::format("{} texels of {} show another surface and are left out.\n", error.flips, error.texture);
     return text;
 }
 

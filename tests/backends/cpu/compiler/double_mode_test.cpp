@@ -240,6 +240,27 @@ TEST(DoubleMode, BitsPackingAndAtomicsGoThroughSinglePrecision) {
     }
 }
 
+TEST(DoubleMode, WhatGoesThroughSinglePrecisionIsListedWithItsLine) {
+    Bench bench("cpu:double");
+    EXPECT_EQ(bench.device().capabilities().float_bits, 53u);
+    bench.compute(
+        "layout(local_size_x = 1) in;\n"
+        "layout(set = 0, binding = 0) buffer Result { float f; uint u; } r;\n"
+        "void main() {\n"
+        "r.f = sin(r.f);\n"
+        "r.u = floatBitsToUint(r.f);\n"
+        "r.f += unpackHalf2x16(r.u).x; }\n");
+    const std::vector<NarrowedOperation> found = bench.device().narrowed_operations();
+    ASSERT_EQ(found.size(), 2u);
+    EXPECT_EQ(found[0], (NarrowedOperation{"test.comp", "test.comp:6", "bit cast"}));
+    EXPECT_EQ(found[1], (NarrowedOperation{"test.comp", "test.comp:7", "unpacking"}));
+    Bench single("cpu");
+    EXPECT_EQ(single.device().capabilities().float_bits, 24u);
+    single.compute("layout(local_size_x = 1) in; layout(set = 0, binding = 0) buffer R { float f; uint u; } r;\n"
+                   "void main() { r.u = floatBitsToUint(r.f); }\n");
+    EXPECT_TRUE(single.device().narrowed_operations().empty());
+}
+
 Texture make_texture(Bench& bench, Format format, TextureUsage usage, std::uint32_t size = 64, std::uint32_t mips = 1) {
     return Bench::ok(bench.device().create_texture(
         {.format = format, .width = size, .height = size, .mips = mips, .usage = usage, .name = "texture"}));
