@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -94,14 +95,21 @@ Expected<rhi::InvocationTrace> trace_texel(const Contestant& contestant, const s
 }
 
 Expected<ErrorOrigin> origin_of(const Contestant& reference, const Contestant& test, const NumericalError& error) {
-    std::string passes;
+    std::string writers;
     for (const IntermediateDescription& description : test.renderer.intermediates())
-        if (description.name == error.texture) passes = description.written_by;
-    const std::size_t comma = passes.rfind(", ");
-    std::string last = comma == std::string::npos ? passes : passes.substr(comma + 2);
-    std::ranges::replace(last, ' ', '_');  // The folder of the pass, where its shaders are.
-    NACRE_TRY(const rhi::InvocationTrace from, trace_texel(reference, last, error.largest));
-    NACRE_TRY(const rhi::InvocationTrace to, trace_texel(test, last, error.largest));
+        if (description.name == error.texture) writers = description.written_by;
+    const std::size_t comma = writers.rfind(", ");
+    const std::string last = comma == std::string::npos ? writers : writers.substr(comma + 2);
+    // The shaders of a pass lie in a folder of their own.
+    std::string folder;
+    for (const passes::PlannedPass& pass : test.renderer.plan().passes)
+        if (pass.name == last && !pass.shaders.empty())
+            folder = std::filesystem::path(pass.shaders.front().path).parent_path().filename().string();
+    if (folder.empty())
+        return fail(ErrorCode::not_found, "trace texel", fmt::format("'{}'", error.texture),
+                    fmt::format("pass '{}' has no shader", last));
+    NACRE_TRY(const rhi::InvocationTrace from, trace_texel(reference, folder, error.largest));
+    NACRE_TRY(const rhi::InvocationTrace to, trace_texel(test, folder, error.largest));
     const auto untold = [&](std::string reason) {
         return fail(ErrorCode::not_found, "trace texel", fmt::format("({}, {})", error.largest.x, error.largest.y),
                     std::move(reason));

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <limits>
 #include <unordered_map>
+#include <unordered_set>
 
 namespace nacre::measure {
 namespace {
@@ -147,6 +148,9 @@ std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& referen
     std::size_t end = 0;
     while (end < common && reference.events[end].instruction == test.events[end].instruction) ++end;
     const auto& instructions = test.instructions;
+    std::unordered_set<std::uint32_t> is_floating;
+    for (const rhi::TracedInstruction& instruction : instructions)
+        if (instruction.is_floating && instruction.result != 0) is_floating.insert(instruction.result);
     // The latest execution of what makes each value, seen from each event.
     std::unordered_map<std::uint32_t, std::vector<Pair>> history;
     std::optional<Pair> last;
@@ -188,7 +192,11 @@ std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& referen
             const double contribution = is_absolute ? pair->error : pair->relative();
             if (contribution > most) most = contribution, largest = pair;
         }
-        if (at.relative() - brought > growth) growth = at.relative() - brought, worst = at, worst_event = event;
+        // What integers are made of integers says nothing about numbers: only where floats become codes it does.
+        const bool counts = instruction.is_floating || std::ranges::any_of(instruction.operands, [&](std::uint32_t operand) {
+                                return is_floating.contains(operand);
+                            });
+        if (counts && at.relative() - brought > growth) growth = at.relative() - brought, worst = at, worst_event = event;
         if (!largest) break;
         at = *largest;
         event = at.event;
@@ -197,9 +205,13 @@ std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& referen
     ErrorOrigin origin{
         test.shader, instruction.line, instruction.operation, worst.reference, worst.value, std::max(growth, 0.0), {}};
     const bool is_read = instruction.operation.starts_with("Image") || instruction.operation == "Load";
+    const bool is_code = !instruction.is_floating;
     origin.text = fmt::format("{} ({}){}: {:.9g}, not {:.9g}; the relative error grows by {:.2g} here",
                               origin.line.empty() ? origin.shader : origin.line, origin.operation,
-                              is_read ? ", a value that came in" : "", origin.value, origin.reference, origin.growth);
+                              is_read   ? ", a value that came in"
+                              : is_code ? ", where it becomes a code of few bits"
+                                        : "",
+                              origin.value, origin.reference, origin.growth);
     return origin;
 }
 
