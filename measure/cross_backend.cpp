@@ -94,32 +94,40 @@ Expected<rhi::InvocationTrace> trace_texel(const Contestant& contestant, const s
     return std::move(trace.invocations.back());
 }
 
-Expected<ErrorOrigin> origin_of(const Contestant& reference, const Contestant& test, const NumericalError& error) {
-    std::string writers;
-    for (const IntermediateDescription& description : test.renderer.intermediates())
-        if (description.name == error.texture) writers = description.written_by;
-    const std::size_t comma = writers.rfind(", ");
-    const std::string last = comma == std::string::npos ? writers : writers.substr(comma + 2);
-    // The shaders of a pass lie in a folder of their own.
-    std::string folder;
-    for (const passes::PlannedPass& pass : test.renderer.plan().passes)
-        if (pass.name == last && !pass.shaders.empty())
-            folder = std::filesystem::path(pass.shaders.front().path).parent_path().filename().string();
-    if (folder.empty())
-        return fail(ErrorCode::not_found, "trace texel", fmt::format("'{}'", error.texture),
-                    fmt::format("pass '{}' has no shader", last));
-    NACRE_TRY(const rhi::InvocationTrace from, trace_texel(reference, folder, error.largest));
-    NACRE_TRY(const rhi::InvocationTrace to, trace_texel(test, folder, error.largest));
+Expected<ErrorOrigin> origin_of(const rhi::InvocationTrace& from, const rhi::InvocationTrace& to, const WrongValue& texel) {
     const auto untold = [&](std::string reason) {
-        return fail(ErrorCode::not_found, "trace texel", fmt::format("({}, {})", error.largest.x, error.largest.y),
+        return fail(ErrorCode::not_found, "trace texel", fmt::format("({}, {})", texel.x, texel.y),
                     std::move(reason));
     };
     if (from.shader != to.shader)
         return untold(fmt::format("'{}' made it in double precision, '{}' in single precision", from.shader, to.shader));
-    std::optional<ErrorOrigin> origin = find_error_origin(from, to, error.largest.stored);
+    std::optional<ErrorOrigin> origin = find_error_origin(from, to, texel.stored);
     if (!origin)
         return untold(fmt::format("both precisions compute the same in '{}', up to where they part", to.shader));
     return *std::move(origin);
+}
+
+Expected<ErrorOrigin> origin_of(const Contestant& reference, const Contestant& test, const NumericalError& error) {
+    std::string writers;
+    for (const IntermediateDescription& description : test.renderer.intermediates())
+        if (description.name == error.texture) writers = description.written_by;
+    // The last pass that made the texel counts. Its shaders lie in a folder of their own.
+    Expected<ErrorOrigin> result = fail(ErrorCode::not_found, "trace texel", fmt::format("'{}'", error.texture), "no shader makes it");
+    while (!writers.empty()) {
+        const std::size_t comma = writers.rfind(", ");
+        const std::string last = comma == std::string::npos ? writers : writers.substr(comma + 2);
+        writers.resize(comma == std::string::npos ? 0 : comma);
+        std::string folder;
+        for (const passes::PlannedPass& pass : test.renderer.plan().passes)
+            if (pass.name == last && !pass.shaders.empty())
+                folder = std::filesystem::path(pass.shaders.front().path).parent_path().filename().string();
+        if (folder.empty()) continue;
+        const auto from = trace_texel(reference, folder, error.largest);
+        const auto to = from ? trace_texel(test, folder, error.largest) : from;
+        if (to) return origin_of(*from, *to, error.largest);
+        result = std::unexpected(to.error());
+    }
+    return result;
 }
 
 void find_origin(const Contestant& reference, const Contestant& test, BackendResult& result) {
@@ -217,6 +225,30 @@ Expected<BackendResult> render(const Contestant& contestant, std::uint32_t frame
 double finite(double value) { return std::isinf(value) ? std::numeric_limits<double>::max() : value; }
 
 double share(std::uint64_t part, std::uint64_t whole) { return whole == 0 ? 0.0 : double(part) / double(whole); }
+
+using Json = nlohmann::ordered_json;
+
+Json error_json(const NumericalError& error) {
+    const WrongValue& at = error.largest;
+    return Json{{"texture", error.texture}, {"values", error.values},         {"exact", error.is_exact},
+                {"flips", error.flips},     {"max_abs", finite(at.error)},    {"max_rel", finite(error.max_rel)},
+                {"rms", finite(error.rms)}, {"share", finite(error.share())}, {"pixel", {at.x, at.y}},
+                {"layer", at.layer},        {"mip", at.mip},                  {"field", at.name},
+                {"reference", finite(at.reference)}, {"value", finite(at.value)}};
+}
+
+void add_errors(const BackendResult& result, Json& json) {
+    for (const NumericalError& error : result.errors) json["numerical_errors"].push_back(error_json(error));
+    const NumericalError* const largest = SceneComparison::largest_error(result);
+    json["largest_error"] = largest ? error_json(*largest) : Json(nullptr);
+    json["origin"] = nullptr;
+    if (!result.origin) return;
+    const ErrorOrigin& origin = *result.origin;
+    json["origin"] = Json{{"texture", result.origin_of},     {"shader", origin.shader},
+                          {"line", origin.line},             {"operation", origin.operation},
+                          {"reference", finite(origin.reference)}, {"value", finite(origin.value)},
+                          {"growth", finite(origin.growth)}};
+}
 
 void judge_texture(const std::string& backend, const TextureDifference& texture, const Tolerance& tolerance,
                    std::vector<std::string>& violations) {
@@ -318,7 +350,6 @@ std::vector<std::string> violations_of(const SceneComparison& comparison, const 
 }
 
 std::string to_json(const SceneComparison& comparison) {
-    using Json = nlohmann::ordered_json;
     Json results = Json::array();
     for (std::size_t b = 1; b < comparison.backends.size(); ++b) {
         const BackendResult& result = comparison.backends[b];
@@ -331,50 +362,22 @@ std::string to_json(const SceneComparison& comparison) {
                                     {"max_abs", finite(texture.max_abs)},
                                     {"max_rel", finite(texture.max_rel)}});
         }
-        Json errors = Json::array();
-        const auto error_json = [](const NumericalError& error) {
-            return Json{{"texture", error.texture},
-                        {"values", error.values},
-                        {"exact", error.is_exact},
-                        {"max_abs", finite(error.largest.error)},
-                        {"max_rel", finite(error.max_rel)}, {"flips", error.flips},
-                        {"rms", finite(error.rms)},
-                        {"share", finite(error.share())},
-                        {"pixel", {error.largest.x, error.largest.y}},
-                        {"layer", error.largest.layer},
-                        {"mip", error.largest.mip},
-                        {"field", error.largest.name},
-                        {"reference", finite(error.largest.reference)},
-                        {"value", finite(error.largest.value)}};
-        };
-        for (const NumericalError& error : result.errors) errors.push_back(error_json(error));
-        Json origin = nullptr;
-        if (result.origin)
-            origin = Json{{"texture", result.origin_of}, {"shader", result.origin->shader},       {"line", result.origin->line},
-                          {"operation", result.origin->operation}, {"reference", finite(result.origin->reference)},
-                          {"value", finite(result.origin->value)}, {"growth", finite(result.origin->growth)}};
-        const NumericalError* const largest = SceneComparison::largest_error(result);
         results.push_back(Json{{"backend", result.backend},
                                {"textures", std::move(textures)},
-                               {"numerical_errors", std::move(errors)},
-                               {"largest_error", largest ? error_json(*largest) : Json(nullptr)},
-                               {"origin", std::move(origin)},
                                {"final",
                                 {{"psnr_db", result.final.psnr_db},
                                  {"flip_mean", result.final.flip_mean},
                                  {"max_abs_8bit", result.final.max_abs_8bit},
                                  {"share_above_1", result.final.share_above_1}}}});
+        if (!result.errors.empty()) add_errors(result, results.back());
     }
-    Json narrowed = Json::array();
+    Json all{{"scene", comparison.scene},
+             {"reference", comparison.backends.empty() ? "" : comparison.backends.front().backend},
+             {"results", std::move(results)}};
     for (const rhi::NarrowedOperation& operation : comparison.narrowed)
-        narrowed.push_back(
+        all["narrowed"].push_back(
             Json{{"shader", operation.shader}, {"line", operation.line}, {"operation", operation.operation}});
-    return Json{{"scene", comparison.scene},
-                {"narrowed", std::move(narrowed)},
-                {"reference", comparison.backends.empty() ? "" : comparison.backends.front().backend},
-                {"results", std::move(results)}}
-               .dump(2, ' ', false, Json::error_handler_t::replace) +
-           "\n";
+    return all.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace nacre::measure

@@ -90,7 +90,9 @@ Expected<SceneComparison> compare_backends(std::string scene, std::span<const Co
 std::vector<std::string> violations_of(const SceneComparison& comparison, const Tolerance& tolerance);
 
 /// {"scene", "reference", "results": [{"backend", "textures": [{"name", "texels", "differing", "fields_differing",
-/// "max_abs", "max_rel"}], "final": {"psnr_db", "flip_mean", "max_abs_8bit", "share_above_1"}}]}. JSON has no infinity:
+/// "max_abs", "max_rel"}], "final": {"psnr_db", "flip_mean", "max_abs_8bit", "share_above_1"}}]}. With a
+/// reference in double precision each result also has "numerical_errors" (of each texture), "largest_error" and "origin",
+/// and the whole "narrowed". JSON has no infinity:
 /// 1.7976931348623157e308 stands for it.
 std::string to_json(const SceneComparison& comparison);
 

@@ -72,6 +72,7 @@ class CpuDevice : public rhi::BackendDevice {
     void lose(const std::string& reason);
     void run_plan(const FlatPlan& plan);
 
+    ExecutionMode mode_;
     rhi::AdapterInfo adapter_;
     rhi::Capabilities capabilities_;
     rhi::FaultInjection faults_;

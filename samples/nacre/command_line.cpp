@@ -196,7 +196,7 @@ void add_scene(CLI::App& app, SceneArguments& arguments, bool is_required = true
 void add_backend(CLI::App& app, SceneArguments& arguments) {
     app.add_option_function<std::string>(
            "-b,--backend", [&](const std::string& text) { arguments.backends = {text}; },
-           fmt::format("Where to render: NAME[:MODE][:lanes=N][:threads=N], NAME being auto (the first that works) or "
+           fmt::format("Where to render: NAME[:MODE][:lanes=N][:threads=N], NAME being auto (the first that works: cpu) or "
                        "one of {}",
                        join(backend_names())))
         ->type_name("BACKEND")

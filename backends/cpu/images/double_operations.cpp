@@ -38,6 +38,14 @@ std::int64_t whole(double value) {
                : static_cast<std::int64_t>(std::clamp(std::floor(value), -farthest_texel, farthest_texel));
 }
 
+/// The logarithm to base 2 that the level of detail is defined by: linear between the powers of two, -127 at zero.
+double linear_log2(double x) {
+    if (!(x >= 0x1p-126)) return -127.0;
+    int exponent = 0;
+    const double half = std::frexp(x, &exponent);
+    return std::isinf(x) ? 128.0 : exponent - 1 + (2.0 * half - 1.0);
+}
+
 std::int64_t modulo(std::int64_t value, std::int64_t period) {
     const std::int64_t rest = value % period;
     return rest < 0 ? rest + period : rest;
@@ -279,11 +287,10 @@ class Lane {
         } else if (flag(image_lod_implicit) || flag(image_lod_gradient)) {
             Vector dx{}, dy{};
             for (std::size_t axis = 0; axis < static_cast<std::size_t>(axes_.spatial); ++axis) {
-                const double* row = arguments_.coordinates[axis];
-                dx[axis] =
-                    flag(image_lod_gradient) ? arguments_.gradient_x[axis][lane_] : row[lane_ | 1] - row[lane_ & ~1u];
-                dy[axis] =
-                    flag(image_lod_gradient) ? arguments_.gradient_y[axis][lane_] : row[lane_ | 2] - row[lane_ & ~2u];
+                // Implicit derivatives are those of the upper left corner of the quad.
+                const double* const quad = arguments_.coordinates[axis] + (lane_ & ~3u);
+                dx[axis] = flag(image_lod_gradient) ? arguments_.gradient_x[axis][lane_] : quad[1] - quad[0];
+                dy[axis] = flag(image_lod_gradient) ? arguments_.gradient_y[axis][lane_] : quad[2] - quad[0];
             }
             std::size_t count = static_cast<std::size_t>(axes_.spatial);
             if (axes_.is_cube) {
@@ -299,14 +306,14 @@ class Lane {
                 length_y += dy[axis] * size[axis] * dy[axis] * size[axis];
             }
             const double longest = std::max(length_x, length_y), shortest = std::min(length_x, length_y);
-            lambda = 0.5 * std::log2(longest);
+            lambda = 0.5 * linear_log2(longest);
             if (sampler_->max_anisotropy > 1.0f && count == 2 && !axes_.is_cube) {
                 const double limit = std::min(sampler_->max_anisotropy, 16.0f);
                 double ratio = std::sqrt(longest) / std::sqrt(shortest);
                 ratio = ratio > 1 ? std::min(ratio, limit) : 1.0;
                 // A footprint that is round but for rounding takes one sample.
                 detail.sample_count = std::ceil(ratio - 1.0 / 256);
-                lambda -= std::log2(ratio);
+                lambda = 0.5 * linear_log2(longest / (ratio * ratio));
                 detail.axis = length_x >= length_y ? std::array{dx[0], dx[1]} : std::array{dy[0], dy[1]};
             }
         }
