@@ -121,8 +121,12 @@ ReportTable error_table(const BackendResult& result) {
                                   largest->largest.y);
     if (!result.no_origin.empty()) table.note += fmt::format(" Where it begins cannot be told: {}", result.no_origin);
     if (result.origin)
-        table.note += fmt::format(" {} begins at {}.", result.no_origin.empty() ? "It" : "The largest of " + result.origin_of,
-                                  result.origin->text);
+        table.note +=
+            fmt::format(" {} begins at {}.", result.no_origin.empty() ? "It" : "The largest of " + result.origin_of,
+                        result.origin->text);
+    if (result.earlier_origin)
+        table.note +=
+            fmt::format(" The largest of {} begins at {}.", result.earlier_origin_of, result.earlier_origin->text);
     return table;
 }
 

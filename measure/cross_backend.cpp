@@ -94,13 +94,14 @@ Expected<rhi::InvocationTrace> trace_texel(const Contestant& contestant, const s
     return std::move(trace.invocations.back());
 }
 
-Expected<ErrorOrigin> origin_of(const rhi::InvocationTrace& from, const rhi::InvocationTrace& to, const WrongValue& texel) {
+Expected<ErrorOrigin> origin_of(const rhi::InvocationTrace& from, const rhi::InvocationTrace& to,
+                                const WrongValue& texel) {
     const auto untold = [&](std::string reason) {
-        return fail(ErrorCode::not_found, "trace texel", fmt::format("({}, {})", texel.x, texel.y),
-                    std::move(reason));
+        return fail(ErrorCode::not_found, "trace texel", fmt::format("({}, {})", texel.x, texel.y), std::move(reason));
     };
     if (from.shader != to.shader)
-        return untold(fmt::format("'{}' made it in double precision, '{}' in single precision", from.shader, to.shader));
+        return untold(
+            fmt::format("'{}' made it in double precision, '{}' in single precision", from.shader, to.shader));
     std::optional<ErrorOrigin> origin = find_error_origin(from, to, texel.stored);
     if (!origin)
         return untold(fmt::format("both precisions compute the same in '{}', up to where they part", to.shader));
@@ -112,7 +113,8 @@ Expected<ErrorOrigin> origin_of(const Contestant& reference, const Contestant& t
     for (const IntermediateDescription& description : test.renderer.intermediates())
         if (description.name == error.texture) writers = description.written_by;
     // The last pass that made the texel counts. Its shaders lie in a folder of their own.
-    Expected<ErrorOrigin> result = fail(ErrorCode::not_found, "trace texel", fmt::format("'{}'", error.texture), "no shader makes it");
+    Expected<ErrorOrigin> result =
+        fail(ErrorCode::not_found, "trace texel", fmt::format("'{}'", error.texture), "no shader makes it");
     while (!writers.empty()) {
         const std::size_t comma = writers.rfind(", ");
         const std::string last = comma == std::string::npos ? writers : writers.substr(comma + 2);
@@ -137,12 +139,18 @@ void find_origin(const Contestant& reference, const Contestant& test, BackendRes
     std::ranges::stable_sort(ranked, std::ranges::greater{}, &NumericalError::share);
     for (const NumericalError* error : ranked) {
         auto origin = origin_of(reference, test, *error);
-        if (origin) {
+        if (origin && !result.origin) {
             result.origin = *std::move(origin);
             result.origin_of = error->texture;
+            if (!result.origin->came_in) return;
+            continue;
+        }
+        if (origin && !origin->came_in) {
+            result.earlier_origin = *std::move(origin);
+            result.earlier_origin_of = error->texture;
             return;
         }
-        if (result.no_origin.empty()) result.no_origin = origin.error().message();
+        if (!origin && !result.origin && result.no_origin.empty()) result.no_origin = origin.error().message();
     }
 }
 
@@ -230,24 +238,38 @@ using Json = nlohmann::ordered_json;
 
 Json error_json(const NumericalError& error) {
     const WrongValue& at = error.largest;
-    return Json{{"texture", error.texture}, {"values", error.values},         {"exact", error.is_exact},
-                {"flips", error.flips},     {"max_abs", finite(at.error)},    {"max_rel", finite(error.max_rel)},
-                {"rms", finite(error.rms)}, {"share", finite(error.share())}, {"pixel", {at.x, at.y}},
-                {"layer", at.layer},        {"mip", at.mip},                  {"field", at.name},
-                {"reference", finite(at.reference)}, {"value", finite(at.value)}};
+    return Json{{"texture", error.texture},
+                {"values", error.values},
+                {"exact", error.is_exact},
+                {"flips", error.flips},
+                {"max_abs", finite(at.error)},
+                {"max_rel", finite(error.max_rel)},
+                {"rms", finite(error.rms)},
+                {"share", finite(error.share())},
+                {"pixel", {at.x, at.y}},
+                {"layer", at.layer},
+                {"mip", at.mip},
+                {"field", at.name},
+                {"reference", finite(at.reference)},
+                {"value", finite(at.value)}};
 }
 
 void add_errors(const BackendResult& result, Json& json) {
     for (const NumericalError& error : result.errors) json["numerical_errors"].push_back(error_json(error));
     const NumericalError* const largest = SceneComparison::largest_error(result);
     json["largest_error"] = largest ? error_json(*largest) : Json(nullptr);
-    json["origin"] = nullptr;
-    if (!result.origin) return;
-    const ErrorOrigin& origin = *result.origin;
-    json["origin"] = Json{{"texture", result.origin_of},     {"shader", origin.shader},
-                          {"line", origin.line},             {"operation", origin.operation},
-                          {"reference", finite(origin.reference)}, {"value", finite(origin.value)},
-                          {"growth", finite(origin.growth)}};
+    const auto origin_json = [](const std::string& texture, const ErrorOrigin& origin) {
+        return Json{{"texture", texture},
+                    {"shader", origin.shader},
+                    {"line", origin.line},
+                    {"operation", origin.operation},
+                    {"came_in", origin.came_in},
+                    {"reference", finite(origin.reference)},
+                    {"value", finite(origin.value)},
+                    {"growth", finite(origin.growth)}};
+    };
+    json["origin"] = result.origin ? origin_json(result.origin_of, *result.origin) : Json(nullptr);
+    if (result.earlier_origin) json["earlier_origin"] = origin_json(result.earlier_origin_of, *result.earlier_origin);
 }
 
 void judge_texture(const std::string& backend, const TextureDifference& texture, const Tolerance& tolerance,

@@ -60,6 +60,9 @@ struct BackendResult {
     std::vector<NumericalError> errors;
     std::optional<ErrorOrigin> origin;
     std::string origin_of;  ///< The texture whose error that is: the largest that can be traced.
+    /// Where the origin is a value that came in: the largest error of another texture that begins in its own pass.
+    std::optional<ErrorOrigin> earlier_origin;
+    std::string earlier_origin_of;
     std::string no_origin;  ///< Why it is not the largest of all.
     std::vector<TexturePictures> texture_pictures;
 };
@@ -91,9 +94,8 @@ std::vector<std::string> violations_of(const SceneComparison& comparison, const 
 
 /// {"scene", "reference", "results": [{"backend", "textures": [{"name", "texels", "differing", "fields_differing",
 /// "max_abs", "max_rel"}], "final": {"psnr_db", "flip_mean", "max_abs_8bit", "share_above_1"}}]}. With a
-/// reference in double precision each result also has "numerical_errors" (of each texture), "largest_error" and "origin",
-/// and the whole "narrowed". JSON has no infinity:
-/// 1.7976931348623157e308 stands for it.
+/// reference in double precision each result also has "numerical_errors" (of each texture), "largest_error" and
+/// "origin", and the whole "narrowed". JSON has no infinity: 1.7976931348623157e308 stands for it.
 std::string to_json(const SceneComparison& comparison);
 
 /// A texture as `read_intermediate` gives it.

@@ -29,7 +29,8 @@ class Sum {
         ++total_.values;
         if (std::isfinite(reference)) total_.largest_value = std::max(total_.largest_value, std::abs(reference));
         if (magnitude > 0.0) total_.max_rel = std::max(total_.max_rel, error / magnitude);
-        if (error > total_.largest.error) total_.largest = {x, y, layer_, mip_, name, reference, value, stored.value_or(value), error};
+        if (error > total_.largest.error)
+            total_.largest = {x, y, layer_, mip_, name, reference, value, stored.value_or(value), error};
     }
 
   private:
@@ -193,19 +194,27 @@ std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& referen
             if (contribution > most) most = contribution, largest = pair;
         }
         // What integers are made of integers says nothing about numbers: only where floats become codes it does.
-        const bool counts = instruction.is_floating || std::ranges::any_of(instruction.operands, [&](std::uint32_t operand) {
-                                return is_floating.contains(operand);
-                            });
-        if (counts && at.relative() - brought > growth) growth = at.relative() - brought, worst = at, worst_event = event;
+        const bool counts = instruction.is_floating ||
+                            std::ranges::any_of(instruction.operands,
+                                                [&](std::uint32_t operand) { return is_floating.contains(operand); });
+        if (counts && at.relative() - brought > growth)
+            growth = at.relative() - brought, worst = at, worst_event = event;
         if (!largest) break;
         at = *largest;
         event = at.event;
     }
     const rhi::TracedInstruction& instruction = instructions[test.events[worst_event].instruction];
-    ErrorOrigin origin{
-        test.shader, instruction.line, instruction.operation, worst.reference, worst.value, std::max(growth, 0.0), {}};
+    ErrorOrigin origin{test.shader,
+                       instruction.line,
+                       instruction.operation,
+                       worst.reference,
+                       worst.value,
+                       std::max(growth, 0.0),
+                       false,
+                       {}};
     const bool is_read = instruction.operation.starts_with("Image") || instruction.operation == "Load";
     const bool is_code = !instruction.is_floating;
+    origin.came_in = is_read;
     origin.text = fmt::format("{} ({}){}: {:.9g}, not {:.9g}; the relative error grows by {:.2g} here",
                               origin.line.empty() ? origin.shader : origin.line, origin.operation,
                               is_read   ? ", a value that came in"

@@ -23,17 +23,18 @@ struct WrongValue {
     std::string name;        ///< Field of a packed word, or channel: "r".
     double reference = 0.0;  ///< In double precision.
     double value = 0.0;
-    double stored = 0.0;     ///< What the shader stored: `value`, or of packed words the word as a signed integer.
-    double error = 0.0;  ///< |value - reference| (radians for octahedral fields, turns for circular ones).
+    double stored = 0.0;  ///< What the shader stored: `value`, or of packed words the word as a signed integer.
+    double error = 0.0;   ///< |value - reference| (radians for octahedral fields, turns for circular ones).
 };
 
 /// The error of all numbers of a texture. Identifiers and flags are no numbers and left out.
 struct NumericalError {
     std::string texture;
     bool is_exact = false;  ///< The reference was read in doubles; otherwise its values were rounded by their format.
-    std::uint64_t values = 0;    ///< Compared.
-    /// Texels of depth textures that show another surface: the value is that of a neighboring texel of the reference, as
-    /// where the edge of a triangle falls on the other side of a pixel. They are no errors of the value, and left out.
+    std::uint64_t values = 0;  ///< Compared.
+    /// Texels of depth textures that show another surface: the value is that of a neighboring texel of the reference,
+    /// as where the edge of a triangle falls on the other side of a pixel. They are no errors of the value, and left
+    /// out.
     std::uint64_t flips = 0;
     double largest_value = 0.0;  ///< Magnitude, of the reference.
     double rms = 0.0;
@@ -55,6 +56,7 @@ struct ErrorOrigin {
     std::string operation;                ///< "FSub", "ImageFetch", ...
     double reference = 0.0, value = 0.0;  ///< The instruction's result in double and in single precision.
     double growth = 0.0;                  ///< Relative error of the result less the largest of its operands.
+    bool came_in = false;                 ///< The instruction reads a texture, a buffer or an input of the shader.
     std::string text;                     ///< One sentence for people.
 };
 

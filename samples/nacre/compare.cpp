@@ -43,8 +43,11 @@ std::string error_text(const measure::BackendResult& result) {
         if (!result.no_origin.empty()) text += fmt::format("Where it begins cannot be told: {}\n", result.no_origin);
         if (result.origin)
             text += fmt::format("{} begins at {}.\n",
-                                result.no_origin.empty() ? "It" : "The largest of " + result.origin_of, result.origin->text);
+                                result.no_origin.empty() ? "It" : "The largest of " + result.origin_of,
+                                result.origin->text);
     }
+    if (result.earlier_origin)
+        text += fmt::format("The largest of {} begins at {}.\n", result.earlier_origin_of, result.earlier_origin->text);
     for (const measure::NumericalError& error : result.errors)
         if (error.flips > 0)
             text += fmt::format("{} texels of {} show another surface and are left out.\n", error.flips, error.texture);

@@ -522,8 +522,11 @@ std::vector<Component> Emitter::load(const Pointer& pointer) {
         std::uint32_t index = 0;
         for_each_component_type(pointer.type, [&](const Type& scalar) { values.push_back(load_lane_component(pointer, index++, scalar)); });
     } else if (pointer.kind == Pointer::Kind::bytes) {
-        if (auto rows = load_rows(pointer)) return std::move(*rows);
-        if (auto equal = load_where_equal(pointer)) return std::move(*equal);
+        // With doubles each word has a shadow, and speed does not matter.
+        if (!in_double()) {
+            if (auto rows = load_rows(pointer)) return std::move(*rows);
+            if (auto equal = load_where_equal(pointer)) return std::move(*equal);
+        }
         visit_layout(pointer, pointer.type, 0, [&](const Pointer& at, std::int64_t extra, const Type& scalar) {
             values.push_back(load_bytes(at, extra, scalar));
         });
@@ -541,7 +544,7 @@ void Emitter::store(const Pointer& pointer, const std::vector<Component>& values
             ++index;
         });
     } else if (pointer.kind == Pointer::Kind::bytes) {
-        if (store_rows(pointer, values)) return;
+        if (!in_double() && store_rows(pointer, values)) return;
         visit_layout(pointer, pointer.type, 0, [&](const Pointer& at, std::int64_t extra, const Type& scalar) {
             store_bytes(at, extra, scalar, values.at(index++));
         });
