@@ -69,6 +69,7 @@ struct Pair {
     [[nodiscard]] double relative() const { return magnitude > 0.0 ? error / magnitude : 0.0; }
 };
 
+/// Of a vector: the component that is off by most.
 Pair pair_of(const rhi::TraceEvent& reference, const rhi::TraceEvent& test, std::size_t event) {
     Pair pair;
     pair.event = event;
@@ -77,9 +78,9 @@ Pair pair_of(const rhi::TraceEvent& reference, const rhi::TraceEvent& test, std:
         const double error = a == b || (std::isnan(a) && std::isnan(b)) ? 0.0
                              : std::isfinite(a - b)                     ? std::abs(a - b)
                                                                         : std::numeric_limits<double>::max();
-        pair.magnitude = std::max(pair.magnitude,
-                                  std::max(std::isfinite(a) ? std::abs(a) : 0.0, std::isfinite(b) ? std::abs(b) : 0.0));
-        if (error > pair.error || i == 0) pair.error = std::max(error, pair.error), pair.reference = a, pair.value = b;
+        if (i > 0 && error <= pair.error) continue;
+        pair.error = error, pair.reference = a, pair.value = b;
+        pair.magnitude = std::max(std::isfinite(a) ? std::abs(a) : 0.0, std::isfinite(b) ? std::abs(b) : 0.0);
     }
     return pair;
 }

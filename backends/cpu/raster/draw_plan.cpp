@@ -150,7 +150,7 @@ TargetSet target_set(const RenderTargets& targets) {
         const std::uint32_t bytes = rhi::info(view.format).block_bytes;
         const std::uint32_t words = bytes < 4 ? 1 : bytes / 4;
         set.colors[i] = {level.data, level.sample_stride, level.row_stride, bytes, view.format, words, set.color_planes,
-                         false,      {}};
+                         false,      {}, level.shadow};
         if (i < targets.color_clears.size() && targets.color_clears[i] && level.data) {
             set.colors[i].clears = true;
             std::memcpy(set.colors[i].clear, targets.color_clears[i]->data(), bytes);
