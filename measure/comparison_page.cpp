@@ -125,8 +125,8 @@ ReportTable error_table(const BackendResult& result) {
             fmt::format(" {} begins at {}.", result.no_origin.empty() ? "It" : "The largest of " + result.origin_of,
                         result.origin->text);
     if (result.earlier_origin)
-        table.note +=
-            fmt::format(" The largest of {} begins at {}.", result.earlier_origin_of, result.earlier_origin->text);
+        table.note += fmt::format(" What came in is of {} and begins at {}.", result.earlier_origin_of,
+                                  result.earlier_origin->text);
     return table;
 }
 

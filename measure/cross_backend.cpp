@@ -108,7 +108,9 @@ Expected<ErrorOrigin> origin_of(const rhi::InvocationTrace& from, const rhi::Inv
     return *std::move(origin);
 }
 
-Expected<ErrorOrigin> origin_of(const Contestant& reference, const Contestant& test, const NumericalError& error) {
+/// @param made_by  set to the pass that made the texel
+Expected<ErrorOrigin> origin_of(const Contestant& reference, const Contestant& test, const NumericalError& error,
+                                std::string& made_by) {
     std::string writers;
     for (const IntermediateDescription& description : test.renderer.intermediates())
         if (description.name == error.texture) writers = description.written_by;
@@ -126,10 +128,39 @@ Expected<ErrorOrigin> origin_of(const Contestant& reference, const Contestant& t
         if (folder.empty()) continue;
         const auto from = trace_texel(reference, folder, error.largest);
         const auto to = from ? trace_texel(test, folder, error.largest) : from;
-        if (to) return origin_of(*from, *to, error.largest);
+        if (to) {
+            made_by = last;
+            return origin_of(*from, *to, error.largest);
+        }
         result = std::unexpected(to.error());
     }
     return result;
+}
+
+/// What came in wrong was made by an earlier pass: looks for it at the same pixel of the textures that the pass reads.
+void find_earlier_origin(const Contestant& reference, const Contestant& test, WrongValue at, std::string pass,
+                         BackendResult& result) {
+    constexpr int most_passes = 4;
+    ErrorOrigin origin = *result.origin;
+    for (int step = 0; step < most_passes && origin.came_in; ++step) {
+        std::vector<std::string> reads;
+        for (const passes::PlannedPass& planned : test.renderer.plan().passes)
+            if (planned.name == pass) reads = planned.reads;
+        at.stored = origin.value;
+        bool is_found = false;
+        for (const std::string& name : reads) {
+            const auto read = std::ranges::find(result.errors, name, &NumericalError::texture);
+            if (read == result.errors.end() || read->largest.error == 0.0) continue;
+            NumericalError there{.texture = name, .largest = at};
+            auto found = origin_of(reference, test, there, pass);
+            if (!found) continue;
+            result.earlier_origin = origin = *std::move(found);
+            result.earlier_origin_of = name;
+            is_found = true;
+            break;
+        }
+        if (!is_found) return;
+    }
 }
 
 void find_origin(const Contestant& reference, const Contestant& test, BackendResult& result) {
@@ -138,19 +169,15 @@ void find_origin(const Contestant& reference, const Contestant& test, BackendRes
         if (error.largest.error > 0.0) ranked.push_back(&error);
     std::ranges::stable_sort(ranked, std::ranges::greater{}, &NumericalError::share);
     for (const NumericalError* error : ranked) {
-        auto origin = origin_of(reference, test, *error);
-        if (origin && !result.origin) {
+        std::string pass;
+        auto origin = origin_of(reference, test, *error, pass);
+        if (origin) {
             result.origin = *std::move(origin);
             result.origin_of = error->texture;
-            if (!result.origin->came_in) return;
-            continue;
-        }
-        if (origin && !origin->came_in) {
-            result.earlier_origin = *std::move(origin);
-            result.earlier_origin_of = error->texture;
+            find_earlier_origin(reference, test, error->largest, std::move(pass), result);
             return;
         }
-        if (!origin && !result.origin && result.no_origin.empty()) result.no_origin = origin.error().message();
+        if (result.no_origin.empty()) result.no_origin = origin.error().message();
     }
 }
 

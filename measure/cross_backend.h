@@ -60,7 +60,7 @@ struct BackendResult {
     std::vector<NumericalError> errors;
     std::optional<ErrorOrigin> origin;
     std::string origin_of;  ///< The texture whose error that is: the largest that can be traced.
-    /// Where the origin is a value that came in: the largest error of another texture that begins in its own pass.
+    /// Where the origin is a value that came in: where that begins, in the pass that made it.
     std::optional<ErrorOrigin> earlier_origin;
     std::string earlier_origin_of;
     std::string no_origin;  ///< Why it is not the largest of all.

@@ -85,10 +85,17 @@ Pair pair_of(const rhi::TraceEvent& reference, const rhi::TraceEvent& test, std:
     return pair;
 }
 
+/// Moves numbers and rounds none.
+bool only_moves(const std::string& operation) {
+    for (const char* name : {"Store", "Phi", "Select", "CompositeConstruct", "CompositeExtract", "CompositeInsert",
+                             "VectorShuffle", "CopyObject", "ImageWrite"})
+        if (operation == name) return true;
+    return false;
+}
+
 bool takes_over_absolute_errors(const std::string& operation) {
-    for (const char* name :
-         {"FAdd", "FSub", "FNegate", "Store", "Load", "Phi", "Select", "CompositeConstruct", "CompositeExtract",
-          "CompositeInsert", "VectorShuffle", "CopyObject", "ImageWrite", "MatrixTimesVector", "Dot"})
+    if (only_moves(operation)) return true;
+    for (const char* name : {"FAdd", "FSub", "FNegate", "Load", "MatrixTimesVector", "Dot"})
         if (operation == name) return true;
     return false;
 }
@@ -195,9 +202,9 @@ std::optional<ErrorOrigin> find_error_origin(const rhi::InvocationTrace& referen
             if (contribution > most) most = contribution, largest = pair;
         }
         // What integers are made of integers says nothing about numbers: only where floats become codes it does.
-        const bool counts = instruction.is_floating ||
-                            std::ranges::any_of(instruction.operands,
-                                                [&](std::uint32_t operand) { return is_floating.contains(operand); });
+        const bool becomes_code = std::ranges::any_of(
+            instruction.operands, [&](std::uint32_t operand) { return is_floating.contains(operand); });
+        const bool counts = !only_moves(instruction.operation) && (instruction.is_floating || becomes_code);
         if (counts && at.relative() - brought > growth)
             growth = at.relative() - brought, worst = at, worst_event = event;
         if (!largest) break;

@@ -47,7 +47,8 @@ std::string error_text(const measure::BackendResult& result) {
                                 result.origin->text);
     }
     if (result.earlier_origin)
-        text += fmt::format("The largest of {} begins at {}.\n", result.earlier_origin_of, result.earlier_origin->text);
+        text += fmt::format("What came in is of {} and begins at {}.\n", result.earlier_origin_of,
+                            result.earlier_origin->text);
     for (const measure::NumericalError& error : result.errors)
         if (error.flips > 0)
             text += fmt::format("{} texels of {} show another surface and are left out.\n", error.flips, error.texture);
