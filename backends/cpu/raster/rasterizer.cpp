@@ -176,7 +176,8 @@ struct Rasterizer::State {
             color_memory[thread].reserve(std::size_t{targets.color_planes} * tile_pixels * sizeof(std::uint32_t), 0);
             workspace(thread).colors = reinterpret_cast<std::uint32_t*>(color_memory[thread].data());
             workspace(thread).doubles = nullptr;
-            if (!draws[0]->plan.in_double) continue;
+            // There may be nothing but targets to clear.
+            if (draw_count == 0 || !draws[0]->plan.in_double) continue;
             constexpr std::size_t bytes = stream_batches * sizeof(FragmentDoubles);
             if (double_memory[thread].reserve(bytes, 0)) std::memset(double_memory[thread].data(), 0, bytes);
             workspace(thread).doubles = reinterpret_cast<FragmentDoubles*>(double_memory[thread].data());
