@@ -98,6 +98,47 @@ ReportTable texture_table(const BackendResult& result, const std::string& refere
     return table;
 }
 
+ReportTable error_table(const BackendResult& result) {
+    ReportTable table{.title = fmt::format("Numerical error of {}", result.backend),
+                      .note =
+                          "Against the reference in double precision. Textures of floats are compared with the "
+                          "reference's doubles, packed "
+                          "words by their decoded fields.",
+                      .columns = {"texture", "largest error", "of the largest value", "relative", "RMS", "pixel",
+                                  "field", "double", "single"},
+                      .is_folded = false};
+    for (const NumericalError& error : result.errors) {
+        const WrongValue& at = error.largest;
+        table.rows.push_back(
+            {text_cell(error.texture), number_cell(fmt::format("{:.3g}", at.error)),
+             number_cell(fmt::format("{:.3g}", error.share())), number_cell(fmt::format("{:.3g}", error.max_rel)),
+             number_cell(fmt::format("{:.3g}", error.rms)),
+             text_cell(fmt::format("{}, {} (layer {}, mip {})", at.x, at.y, at.layer, at.mip)), text_cell(at.name),
+             number_cell(fmt::format("{:.9g}", at.reference)), number_cell(fmt::format("{:.9g}", at.value))});
+    }
+    if (const NumericalError* const largest = SceneComparison::largest_error(result))
+        table.note += fmt::format(" The largest is that of {} at pixel {}, {}.", largest->texture, largest->largest.x,
+                                  largest->largest.y);
+    if (!result.no_origin.empty()) table.note += fmt::format(" Where it begins cannot be told: {}", result.no_origin);
+    if (result.origin)
+        table.note +=
+            fmt::format(" {} begins at {}.", result.no_origin.empty() ? "It" : "The largest of " + result.origin_of,
+                        result.origin->text);
+    if (result.earlier_origin)
+        table.note += fmt::format(" What came in is of {} and begins at {}.", result.earlier_origin_of,
+                                  result.earlier_origin->text);
+    return table;
+}
+
+ReportTable narrowed_table(const SceneComparison& comparison) {
+    ReportTable table{.title = "Single precision in the reference",
+                      .note = "These instructions go through floats of 32 bits in double precision too.",
+                      .columns = {"operation", "line", "shader"}};
+    for (const rhi::NarrowedOperation& operation : comparison.narrowed)
+        table.rows.push_back({text_cell(operation.operation), text_cell(operation.line), text_cell(operation.shader)});
+    return table;
+}
+
 ReportGallery difference_gallery(const SceneComparison& comparison, const std::vector<PairDifference>& pairs,
                                  Expected<void>& status) {
     constexpr float gain = 32.0f;
@@ -199,7 +240,9 @@ Expected<ReportPage> comparison_page(const SceneComparison& comparison, const st
         if (!result.textures.empty()) {
             page.details.push_back(texture_table(result, comparison.backends.front().backend));
         }
+        if (!result.errors.empty()) page.tables.push_back(error_table(result));
     }
+    if (!comparison.narrowed.empty()) page.details.push_back(narrowed_table(comparison));
     ReportTable warnings{.title = "Warnings", .columns = {"backend", "warning"}};
     for (const BackendResult& result : comparison.backends) {
         for (const std::string& warning : result.warnings) {

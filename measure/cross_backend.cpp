@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -66,10 +67,126 @@ Error named(Error error, const std::string& backend) {
     return error;
 }
 
+bool is_more_precise(const Contestant& reference, const Contestant& test) {
+    return reference.rhi_device && test.rhi_device &&
+           reference.rhi_device->capabilities().float_bits > test.rhi_device->capabilities().float_bits;
+}
+
+// What the invocation that made a texel computed on one device; the last pass that writes the texture counts.
+Expected<rhi::InvocationTrace> trace_texel(const Contestant& contestant, const std::string& pass,
+                                           const WrongValue& texel) {
+    rhi::TraceRequest request{.shader = pass, .x = texel.x, .y = texel.y, .z = texel.layer};
+    const auto run = [&]() -> Expected<rhi::Trace> {
+        NACRE_CHECK(contestant.rhi_device->start_trace(request));
+        auto frame = contestant.renderer.render_frame();
+        auto trace = contestant.rhi_device->finish_trace();
+        if (!frame) return std::unexpected(frame.error());
+        return trace;
+    };
+    NACRE_TRY(rhi::Trace trace, run());
+    if (!trace.writers.empty()) {
+        request.invocation = trace.writers.back();
+        NACRE_TRY(trace, run());
+    }
+    if (trace.invocations.empty())
+        return fail(ErrorCode::not_found, "trace texel", fmt::format("({}, {})", texel.x, texel.y),
+                    fmt::format("no shader of pass '{}' made it", pass));
+    return std::move(trace.invocations.back());
+}
+
+Expected<ErrorOrigin> origin_of(const rhi::InvocationTrace& from, const rhi::InvocationTrace& to,
+                                const WrongValue& texel) {
+    const auto untold = [&](std::string reason) {
+        return fail(ErrorCode::not_found, "trace texel", fmt::format("({}, {})", texel.x, texel.y), std::move(reason));
+    };
+    if (from.shader != to.shader)
+        return untold(
+            fmt::format("'{}' made it in double precision, '{}' in single precision", from.shader, to.shader));
+    std::optional<ErrorOrigin> origin = find_error_origin(from, to, texel.stored);
+    if (!origin)
+        return untold(fmt::format("both precisions compute the same in '{}', up to where they part", to.shader));
+    return *std::move(origin);
+}
+
+/// @param made_by  set to the pass that made the texel
+Expected<ErrorOrigin> origin_of(const Contestant& reference, const Contestant& test, const NumericalError& error,
+                                std::string& made_by) {
+    std::string writers;
+    for (const IntermediateDescription& description : test.renderer.intermediates())
+        if (description.name == error.texture) writers = description.written_by;
+    // The last pass that made the texel counts. Its shaders lie in a folder of their own.
+    Expected<ErrorOrigin> result =
+        fail(ErrorCode::not_found, "trace texel", fmt::format("'{}'", error.texture), "no shader makes it");
+    while (!writers.empty()) {
+        const std::size_t comma = writers.rfind(", ");
+        const std::string last = comma == std::string::npos ? writers : writers.substr(comma + 2);
+        writers.resize(comma == std::string::npos ? 0 : comma);
+        std::string folder;
+        for (const passes::PlannedPass& pass : test.renderer.plan().passes)
+            if (pass.name == last && !pass.shaders.empty())
+                folder = std::filesystem::path(pass.shaders.front().path).parent_path().filename().string();
+        if (folder.empty()) continue;
+        const auto from = trace_texel(reference, folder, error.largest);
+        const auto to = from ? trace_texel(test, folder, error.largest) : from;
+        if (to) {
+            made_by = last;
+            return origin_of(*from, *to, error.largest);
+        }
+        result = std::unexpected(to.error());
+    }
+    return result;
+}
+
+/// What came in wrong was made by an earlier pass: looks for it at the same pixel of the textures that the pass reads.
+void find_earlier_origin(const Contestant& reference, const Contestant& test, WrongValue at, std::string pass,
+                         BackendResult& result) {
+    constexpr int most_passes = 4;
+    ErrorOrigin origin = *result.origin;
+    for (int step = 0; step < most_passes && origin.came_in; ++step) {
+        std::vector<std::string> reads;
+        for (const passes::PlannedPass& planned : test.renderer.plan().passes)
+            if (planned.name == pass) reads = planned.reads;
+        at.stored = origin.value;
+        bool is_found = false;
+        for (const std::string& name : reads) {
+            const auto read = std::ranges::find(result.errors, name, &NumericalError::texture);
+            if (read == result.errors.end() || read->largest.error == 0.0) continue;
+            NumericalError there{.texture = name, .largest = at};
+            auto found = origin_of(reference, test, there, pass);
+            if (!found) continue;
+            result.earlier_origin = origin = *std::move(found);
+            result.earlier_origin_of = name;
+            is_found = true;
+            break;
+        }
+        if (!is_found) return;
+    }
+}
+
+void find_origin(const Contestant& reference, const Contestant& test, BackendResult& result) {
+    std::vector<const NumericalError*> ranked;
+    for (const NumericalError& error : result.errors)
+        if (error.largest.error > 0.0) ranked.push_back(&error);
+    std::ranges::stable_sort(ranked, std::ranges::greater{}, &NumericalError::share);
+    for (const NumericalError* error : ranked) {
+        std::string pass;
+        auto origin = origin_of(reference, test, *error, pass);
+        if (origin) {
+            result.origin = *std::move(origin);
+            result.origin_of = error->texture;
+            find_earlier_origin(reference, test, error->largest, std::move(pass), result);
+            return;
+        }
+        if (result.no_origin.empty()) result.no_origin = origin.error().message();
+    }
+}
+
 // All layers and mips of one texture on two devices.
 Expected<TextureDifference> compare_texture(const Contestant& reference, const Contestant& test,
                                             const IntermediateDescription& description, bool with_pictures,
                                             BackendResult& result) {
+    NumericalError error{.texture = description.name};
+    const bool measures_error = is_more_precise(reference, test);
     TextureDifference sum{.name = description.name};
     std::optional<TexturePictures> pictures;
     for (std::uint32_t mip = 0; mip < description.mips; ++mip) {
@@ -82,6 +199,14 @@ Expected<TextureDifference> compare_texture(const Contestant& reference, const C
             const TextureData data_b = texture_data_of(*std::move(b));
             NACRE_TRY(const TextureDifference part, compare_contents(data_a, data_b));
             accumulate(sum, part);
+            if (measures_error && data_a.format == data_b.format) {
+                // Packed words have no more than their bits.
+                std::vector<double> exact;
+                if (data_a.fields.empty() && !rhi::info(data_a.format).is_integer())
+                    if (auto values = reference.renderer.read_exact_intermediate(description.name, layer, mip))
+                        exact = *std::move(values);
+                NACRE_CHECK(add_numerical_error(data_a, data_b, exact, layer, mip, error));
+            }
             if (with_pictures && part.differing > 0 && !pictures && data_a.format == data_b.format) {
                 NACRE_TRY(Image picture, picture_of(data_a));
                 NACRE_TRY(Image mask, difference_mask(data_a, data_b));
@@ -89,6 +214,7 @@ Expected<TextureDifference> compare_texture(const Contestant& reference, const C
             }
         }
     }
+    if (error.values > 0) result.errors.push_back(std::move(error));
     if (pictures) result.texture_pictures.push_back(*std::move(pictures));
     return sum;
 }
@@ -135,6 +261,44 @@ double finite(double value) { return std::isinf(value) ? std::numeric_limits<dou
 
 double share(std::uint64_t part, std::uint64_t whole) { return whole == 0 ? 0.0 : double(part) / double(whole); }
 
+using Json = nlohmann::ordered_json;
+
+Json error_json(const NumericalError& error) {
+    const WrongValue& at = error.largest;
+    return Json{{"texture", error.texture},
+                {"values", error.values},
+                {"exact", error.is_exact},
+                {"flips", error.flips},
+                {"max_abs", finite(at.error)},
+                {"max_rel", finite(error.max_rel)},
+                {"rms", finite(error.rms)},
+                {"share", finite(error.share())},
+                {"pixel", {at.x, at.y}},
+                {"layer", at.layer},
+                {"mip", at.mip},
+                {"field", at.name},
+                {"reference", finite(at.reference)},
+                {"value", finite(at.value)}};
+}
+
+void add_errors(const BackendResult& result, Json& json) {
+    for (const NumericalError& error : result.errors) json["numerical_errors"].push_back(error_json(error));
+    const NumericalError* const largest = SceneComparison::largest_error(result);
+    json["largest_error"] = largest ? error_json(*largest) : Json(nullptr);
+    const auto origin_json = [](const std::string& texture, const ErrorOrigin& origin) {
+        return Json{{"texture", texture},
+                    {"shader", origin.shader},
+                    {"line", origin.line},
+                    {"operation", origin.operation},
+                    {"came_in", origin.came_in},
+                    {"reference", finite(origin.reference)},
+                    {"value", finite(origin.value)},
+                    {"growth", finite(origin.growth)}};
+    };
+    json["origin"] = result.origin ? origin_json(result.origin_of, *result.origin) : Json(nullptr);
+    if (result.earlier_origin) json["earlier_origin"] = origin_json(result.earlier_origin_of, *result.earlier_origin);
+}
+
 void judge_texture(const std::string& backend, const TextureDifference& texture, const Tolerance& tolerance,
                    std::vector<std::string>& violations) {
     TextureTolerance bounds;
@@ -180,12 +344,21 @@ Expected<SceneComparison> compare_backends(std::string scene, std::span<const Co
         comparison.backends.push_back(std::move(result));
         if (&contestant == &contestants.front()) continue;
         BackendResult& test = comparison.backends.back();
-        if (options.textures) NACRE_CHECK(compare_all_textures(contestants.front(), contestant, options, test));
+        if (options.textures) {
+            NACRE_CHECK(compare_all_textures(contestants.front(), contestant, options, test));
+            find_origin(contestants.front(), contestant, test);
+        }
         NACRE_TRY(test.final,
                   compare_pictures(linear_from_srgb_bytes(comparison.backends.front().picture.tone_mapped),
                                    linear_from_srgb_bytes(test.picture.tone_mapped)));
     }
+    if (contestants.front().rhi_device) comparison.narrowed = contestants.front().rhi_device->narrowed_operations();
     return comparison;
+}
+
+const NumericalError* SceneComparison::largest_error(const BackendResult& result) {
+    const auto found = std::ranges::max_element(result.errors, {}, &NumericalError::share);
+    return found == result.errors.end() || found->largest.error == 0.0 ? nullptr : &*found;
 }
 
 std::vector<std::string> violations_of(const SceneComparison& comparison, const Tolerance& tolerance) {
@@ -226,7 +399,6 @@ std::vector<std::string> violations_of(const SceneComparison& comparison, const 
 }
 
 std::string to_json(const SceneComparison& comparison) {
-    using Json = nlohmann::ordered_json;
     Json results = Json::array();
     for (std::size_t b = 1; b < comparison.backends.size(); ++b) {
         const BackendResult& result = comparison.backends[b];
@@ -246,12 +418,15 @@ std::string to_json(const SceneComparison& comparison) {
                                  {"flip_mean", result.final.flip_mean},
                                  {"max_abs_8bit", result.final.max_abs_8bit},
                                  {"share_above_1", result.final.share_above_1}}}});
+        if (!result.errors.empty()) add_errors(result, results.back());
     }
-    return Json{{"scene", comparison.scene},
-                {"reference", comparison.backends.empty() ? "" : comparison.backends.front().backend},
-                {"results", std::move(results)}}
-               .dump(2, ' ', false, Json::error_handler_t::replace) +
-           "\n";
+    Json all{{"scene", comparison.scene},
+             {"reference", comparison.backends.empty() ? "" : comparison.backends.front().backend},
+             {"results", std::move(results)}};
+    for (const rhi::NarrowedOperation& operation : comparison.narrowed)
+        all["narrowed"].push_back(
+            Json{{"shader", operation.shader}, {"line", operation.line}, {"operation", operation.operation}});
+    return all.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace nacre::measure

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "core/error.h"
 #include "measure/frame_times.h"
 #include "measure/image_metrics.h"
+#include "measure/numerical_error.h"
 #include "measure/texture_comparison.h"
 #include "measure/tolerance.h"
 #include "passes/renderer.h"
@@ -30,6 +32,8 @@ struct Contestant {
     std::string backend;  ///< As written on the command line: "gl", "cpu:double".
     std::string device;   ///< For people.
     passes::Renderer& renderer;
+    /// The renderer's, to find out where errors begin; null: that is left out.
+    rhi::Device* rhi_device = nullptr;
 };
 
 /// What a texture looked like on both sides, for people.
@@ -51,12 +55,26 @@ struct BackendResult {
     std::vector<std::string> missing;          ///< Textures of the reference that this backend lacks.
     std::vector<std::string> added;            ///< Textures that the reference lacks.
     PictureDifference final;
+    /// Where the reference is in double precision (Capabilities::float_bits) and this backend is not: of every texture
+    /// of numbers in `textures`, and where the largest of them begins.
+    std::vector<NumericalError> errors;
+    std::optional<ErrorOrigin> origin;
+    std::string origin_of;  ///< The texture whose error that is: the largest that can be traced.
+    /// Where the origin is a value that came in: where that begins, in the pass that made it.
+    std::optional<ErrorOrigin> earlier_origin;
+    std::string earlier_origin_of;
+    std::string no_origin;  ///< Why it is not the largest of all.
     std::vector<TexturePictures> texture_pictures;
 };
 
 struct SceneComparison {
     std::string scene;
     std::vector<BackendResult> backends;  ///< The reference first.
+    /// Of a reference in double precision: what went through single precision all the same.
+    std::vector<rhi::NarrowedOperation> narrowed;
+
+    /// The error of `result` that is the largest part of its texture's largest value; null where there is none.
+    [[nodiscard]] static const NumericalError* largest_error(const BackendResult& result);
 };
 
 struct ComparisonOptions {
@@ -75,8 +93,9 @@ Expected<SceneComparison> compare_backends(std::string scene, std::span<const Co
 std::vector<std::string> violations_of(const SceneComparison& comparison, const Tolerance& tolerance);
 
 /// {"scene", "reference", "results": [{"backend", "textures": [{"name", "texels", "differing", "fields_differing",
-/// "max_abs", "max_rel"}], "final": {"psnr_db", "flip_mean", "max_abs_8bit", "share_above_1"}}]}. JSON has no infinity:
-/// 1.7976931348623157e308 stands for it.
+/// "max_abs", "max_rel"}], "final": {"psnr_db", "flip_mean", "max_abs_8bit", "share_above_1"}}]}. With a
+/// reference in double precision each result also has "numerical_errors" (of each texture), "largest_error" and
+/// "origin", and the whole "narrowed". JSON has no infinity: 1.7976931348623157e308 stands for it.
 std::string to_json(const SceneComparison& comparison);
 
 /// A texture as `read_intermediate` gives it.

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "passes/renderer.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <glm/gtc/packing.hpp>
 
 #include "core/srgb.h"
 #include "passes/camera_block.h"
 #include "passes/environment_preparation/environment_preparation.h"
+#include "passes/exact_readback.h"
 #include "passes/lights.h"
 #include "passes/profiles.h"
 #include "passes/render_pass.h"
@@ -628,12 +630,14 @@ std::vector<IntermediateDescription> Renderer::intermediates() const {
     return result;
 }
 
-Expected<IntermediateContent> Renderer::read_intermediate(std::string_view name, std::uint32_t layer, std::uint32_t mip) {
+/// Where a texture lies that `read_intermediate` can read.
+Expected<rhi::Texture> Renderer::find_intermediate(std::string_view name, std::uint32_t layer, std::uint32_t mip,
+                                                   IntermediateDescription& description) const {
     const auto known = intermediates();
     const auto found = std::ranges::find(known, name, &IntermediateDescription::name);
     if (found == known.end()) {
         std::vector<std::string> names;
-        for (const IntermediateDescription& description : known) names.push_back(description.name);
+        for (const IntermediateDescription& one : known) names.push_back(one.name);
         return fail(ErrorCode::not_found, "read intermediate texture", fmt::format("'{}'", name),
                     "no pass of this plan writes a texture of that name",
                     fmt::format("There are {}.", fmt::join(names, ", ")));
@@ -647,15 +651,28 @@ Expected<IntermediateContent> Renderer::read_intermediate(std::string_view name,
         return fail(ErrorCode::invalid_argument, "read intermediate texture", fmt::format("'{}'", name),
                     fmt::format("it has {} layers and {} mips", found->layers, found->mips), "Count from 0.");
     }
+    description = *found;
     const auto& nodes = state_->graph.textures();
     const auto node = std::ranges::find_if(
         nodes, [&](const FrameGraph::TextureNode& n) { return n.desc.name == name && n.is_live() && !n.is_detail; });
-    IntermediateContent content{.description = *found};
-    const rhi::Extent3D extent = rhi::mip_extent(node->desc, mip);
-    content.width = extent.width;
-    content.height = extent.height;
-    NACRE_TRY(content.bytes, state_->device.read_texture(node->handle, mip, layer));
+    return node->handle;
+}
+
+Expected<IntermediateContent> Renderer::read_intermediate(std::string_view name, std::uint32_t layer,
+                                                          std::uint32_t mip) {
+    IntermediateContent content;
+    NACRE_TRY(const rhi::Texture texture, find_intermediate(name, layer, mip, content.description));
+    content.width = std::max(content.description.width >> mip, 1u);
+    content.height = std::max(content.description.height >> mip, 1u);
+    NACRE_TRY(content.bytes, state_->device.read_texture(texture, mip, layer));
     return content;
+}
+
+Expected<std::vector<double>> Renderer::read_exact_intermediate(std::string_view name, std::uint32_t layer,
+                                                                std::uint32_t mip) {
+    IntermediateDescription description;
+    NACRE_TRY(const rhi::Texture texture, find_intermediate(name, layer, mip, description));
+    return read_exactly(state_->device, texture, mip, layer);
 }
 
 const Plan& Renderer::plan() const { return state_->plan; }

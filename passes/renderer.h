@@ -139,6 +139,11 @@ class Renderer {
     Expected<IntermediateContent> read_intermediate(std::string_view name, std::uint32_t layer = 0,
                                                     std::uint32_t mip = 0);
 
+    /// Four doubles for each texel of an intermediate texture of floats or fixed-point numbers, with all the precision
+    /// that the device has (see exact_readback.h). Errors: those of `read_intermediate`, and unsupported.
+    Expected<std::vector<double>> read_exact_intermediate(std::string_view name, std::uint32_t layer = 0,
+                                                          std::uint32_t mip = 0);
+
     [[nodiscard]] const Plan& plan() const;
     [[nodiscard]] std::string graph_as_dot() const;
     [[nodiscard]] std::string graph_as_svg() const;
@@ -148,6 +153,8 @@ class Renderer {
   private:
     struct State;
     explicit Renderer(std::unique_ptr<State> state);
+    Expected<rhi::Texture> find_intermediate(std::string_view name, std::uint32_t layer, std::uint32_t mip,
+                                             IntermediateDescription& description) const;
     std::unique_ptr<State> state_;
 };
 

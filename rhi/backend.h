@@ -15,6 +15,7 @@
 #include "rhi/command_stream.h"
 #include "rhi/device.h"
 #include "rhi/reflection.h"
+#include "rhi/trace.h"
 
 /// @file
 /// What a backend implements. Every backend is the same list of nouns (buffer, texture, sampler, shader, bind group,
@@ -200,6 +201,11 @@ class BackendDevice {
     /// reserved_bytes and driver_allocations; the front end fills in the rest.
     [[nodiscard]] virtual MemoryStatistics memory_statistics() const = 0;
     virtual Expected<void> save_pipeline_cache() = 0;
+    /// Of all pipelines made so far; empty where the device is not in double precision.
+    [[nodiscard]] virtual std::vector<NarrowedOperation> narrowed_operations() const { return {}; }
+    /// See rhi/trace.h; called while nothing is executed.
+    virtual Expected<void> start_trace(const TraceRequest& request);
+    virtual Expected<Trace> finish_trace();
 };
 
 /// An API that devices are made from. Stateless apart from the opened driver library; thread-safe.

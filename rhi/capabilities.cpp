@@ -29,7 +29,7 @@ namespace {
                     X(max_sampled_textures) X(max_samplers) X(max_storage_images) X(max_workgroup_size)                \
                         X(max_workgroup_count) X(max_workgroup_invocations) X(max_workgroup_memory_bytes)              \
                             X(subgroup_size) X(max_bindless_textures) X(max_anisotropy) X(max_line_width)              \
-                                X(max_point_size)
+                                X(max_point_size) X(float_bits)
 #define NACRE_ALIGNMENTS(X) X(uniform_offset_alignment) X(storage_offset_alignment)
 #define NACRE_MEASURES(X) X(timestamp_period_ns) X(device_memory_bytes)
 

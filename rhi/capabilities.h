@@ -81,6 +81,7 @@ struct Capabilities {
     std::uint32_t max_workgroup_memory_bytes = 0;
     std::uint32_t subgroup_size = 0;          ///< 0 where subgroup operations are missing.
     std::uint32_t max_bindless_textures = 0;  ///< With descriptor indexing.
+    std::uint32_t float_bits = 24;            ///< Significant bits of a GLSL float: 53 on devices in double precision.
     float max_anisotropy = 1.0f;
     float max_line_width = 1.0f;
     float max_point_size = 1.0f;

@@ -156,6 +156,23 @@ MemoryStatistics Device::memory_statistics() const {
     return statistics;
 }
 
+std::vector<NarrowedOperation> Device::narrowed_operations() const {
+    const std::lock_guard lock(state_->mutex);
+    return state_->backend->narrowed_operations();
+}
+
+Expected<void> Device::start_trace(const TraceRequest& request) {
+    NACRE_CHECK(wait_idle());
+    const std::lock_guard lock(state_->mutex);
+    return state_->backend->start_trace(request);
+}
+
+Expected<Trace> Device::finish_trace() {
+    NACRE_CHECK(wait_idle());
+    const std::lock_guard lock(state_->mutex);
+    return state_->backend->finish_trace();
+}
+
 Expected<void> Device::save_pipeline_cache() {
     if (state_->lost) return state_->lost_error("save pipeline cache");
     const std::lock_guard lock(state_->mutex);

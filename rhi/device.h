@@ -18,6 +18,7 @@
 #include "rhi/pipeline.h"
 #include "rhi/reflection.h"
 #include "rhi/resources.h"
+#include "rhi/trace.h"
 #include "rhi/validation.h"
 
 /// @file
@@ -190,6 +191,13 @@ class Device {
     Expected<std::vector<std::uint64_t>> read_queries(QueryPool pool, std::uint32_t first, std::uint32_t count);
 
     [[nodiscard]] MemoryStatistics memory_statistics() const;
+    /// Instructions that go through single precision, of all pipelines made so far, sorted and each once; empty where
+    /// Capabilities::float_bits is 24.
+    [[nodiscard]] std::vector<NarrowedOperation> narrowed_operations() const;
+    /// Notes what one invocation computes in all work from here to `finish_trace`, which waits for that work. Slow.
+    /// Errors: unsupported (the backend cannot), device_lost.
+    Expected<void> start_trace(const TraceRequest& request);
+    Expected<Trace> finish_trace();
     /// Writes the driver's pipeline cache to disk now (it also happens at destruction).
     Expected<void> save_pipeline_cache();
 

@@ -211,6 +211,13 @@ Expected<QueryPool> Device::create_query_pool(const QueryPoolDesc& desc) {
     return insert(device, QueryPool{}, std::move(object), "create query pool");
 }
 
+Expected<void> BackendDevice::start_trace(const TraceRequest& request) {
+    return fail(ErrorCode::unsupported, "trace shaders", fmt::format("'{}'", request.shader),
+                "this backend cannot look into its shaders", "Use backend cpu.");
+}
+
+Expected<Trace> BackendDevice::finish_trace() { return Trace{}; }
+
 Expected<std::unique_ptr<BackendAccelerationStructure>> BackendDevice::create_acceleration_structure(
     const AccelerationStructureDesc& desc) {
     return fail(ErrorCode::unsupported, "create acceleration structure", "'" + desc.name + "'",

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "backends/cpu/images/double_texels.h"
 #include "backends/cpu/parallel_parts.h"
 #include "backends/cpu/texel_rows.h"
 #include "backends/cpu/transfer.h"
@@ -23,6 +24,7 @@ constexpr std::uint32_t source_piece_texels = piece_texels * 2 + 8;
 struct Taps {
     std::uint32_t first, second;
     float weight;
+    double exact_weight;
 };
 
 /// @param size  texels of the mip above
@@ -30,7 +32,7 @@ struct Taps {
 Taps taps_of(std::uint32_t index, std::uint32_t size, std::uint32_t next) {
     const double place = std::max((index + 0.5) * size / next - 0.5, 0.0);
     const auto first = static_cast<std::uint32_t>(place);
-    return {first, std::min(first + 1, size - 1), static_cast<float>(place - first)};
+    return {first, std::min(first + 1, size - 1), static_cast<float>(place - first), place - first};
 }
 
 void add_weighted(std::span<LinearTexel> sum, std::span<const LinearTexel> texels, float weight) {
@@ -102,8 +104,51 @@ class MipRow {
 
 }  // namespace
 
+/// On doubles: the eight texels of two rows, columns and slices, each with the product of its weights.
+void Transfer::generate_double_mip(const ImageView& view, std::uint32_t mip) {
+    const ImageLevel &from = view.levels[mip - 1], &to = view.levels[mip];
+    const auto offset_of = [&](const ImageLevel& level, std::uint64_t layer, std::uint64_t x, std::uint64_t y,
+                               std::uint64_t z) {
+        return layer * level.layer_stride + z * level.slice_stride + y * level.row_stride + x * view.texel_bytes;
+    };
+    const std::uint64_t layer_rows = std::uint64_t{to.height} * to.depth;
+    in_parallel(scheduler_, layer_rows * view.layer_count, from.width * sizeof(DoubleTexel),
+                [&](std::uint64_t begin, std::uint64_t count) {
+                    for (std::uint64_t at = begin; at < begin + count; ++at) {
+                        const std::uint64_t layer = at / layer_rows;
+                        const auto z = static_cast<std::uint32_t>(at % layer_rows / to.height),
+                                   y = static_cast<std::uint32_t>(at % to.height);
+                        const Taps rows = taps_of(y, from.height, to.height), slices = taps_of(z, from.depth, to.depth);
+                        for (std::uint32_t x = 0; x < to.width; ++x) {
+                            const Taps columns = taps_of(x, from.width, to.width);
+                            DoubleTexel sum{};
+                            for (int tap = 0; tap < 8; ++tap) {
+                                const auto part = [&](const Taps& taps, bool is_second) {
+                                    return is_second ? taps.exact_weight : 1.0 - taps.exact_weight;
+                                };
+                                const bool right = (tap & 1) != 0, lower = (tap & 2) != 0, behind = (tap & 4) != 0;
+                                const double weight = part(columns, right) * part(rows, lower) * part(slices, behind);
+                                if (weight == 0.0) continue;
+                                const std::uint64_t offset =
+                                    offset_of(from, layer, right ? columns.second : columns.first,
+                                              lower ? rows.second : rows.first, behind ? slices.second : slices.first);
+                                const DoubleTexel texel = load_double(view.format, from.data + offset,
+                                                                      from.shadow + offset / view.texel_bytes * 4);
+                                for (std::size_t c = 0; c < 4; ++c) sum[c] += weight * texel[c];
+                            }
+                            const std::uint64_t offset = offset_of(to, layer, x, y, z);
+                            store_double(view.format, sum, to.data + offset, to.shadow + offset / view.texel_bytes * 4);
+                        }
+                    }
+                });
+}
+
 void Transfer::generate_mips(const ImageView& view) {
     for (std::uint32_t mip = 1; mip < view.mip_count; ++mip) {
+        if (view.levels[mip].shadow) {
+            generate_double_mip(view, mip);
+            continue;
+        }
         const ImageLevel &from = view.levels[mip - 1], &to = view.levels[mip];
         std::vector<Taps> columns(to.width);
         for (std::uint32_t x = 0; x < to.width; ++x) columns[x] = taps_of(x, from.width, to.width);
@@ -133,6 +178,27 @@ void Transfer::generate_mips(const ImageView& view) {
 void Transfer::resolve(const ImageView& source, const ImageView& destination, std::uint32_t width,
                        std::uint32_t height) {
     const ImageLevel &from = source.levels[0], &to = destination.levels[0];
+    if (from.shadow && to.shadow) {
+        in_parallel(
+            scheduler_, height, std::uint64_t{width} * sizeof(DoubleTexel),
+            [&](std::uint64_t first, std::uint64_t count) {
+                for (std::uint64_t y = first; y < first + count; ++y)
+                    for (std::uint32_t x = 0; x < width; ++x) {
+                        DoubleTexel sum{};
+                        for (std::uint32_t sample = 0; sample < source.samples; ++sample) {
+                            const std::uint64_t offset =
+                                sample * from.sample_stride + y * from.row_stride + x * source.texel_bytes;
+                            const DoubleTexel texel = load_double(source.format, from.data + offset,
+                                                                  from.shadow + offset / source.texel_bytes * 4);
+                            for (std::size_t c = 0; c < 4; ++c) sum[c] += texel[c] / source.samples;
+                        }
+                        const std::uint64_t offset = y * to.row_stride + std::uint64_t{x} * destination.texel_bytes;
+                        store_double(destination.format, sum, to.data + offset,
+                                     to.shadow + offset / destination.texel_bytes * 4);
+                    }
+            });
+        return;
+    }
     const bool is_copy = source.samples == 1 || rhi::info(source.format).is_integer();
     const std::uint64_t row_cost = std::uint64_t{width} * (is_copy ? source.texel_bytes : sizeof(LinearTexel));
     const float weight = 1.0f / static_cast<float>(source.samples);

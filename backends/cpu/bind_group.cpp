@@ -69,6 +69,7 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> CpuBindGroup::create(rhi::Backe
             if (const auto* buffer = static_cast<const CpuBuffer*>(binding.buffer)) {
                 descriptor.data = buffer->data() + binding.offset;
                 descriptor.size = std::min(binding.size, buffer->size_from(binding.offset));
+                if (buffer->shadow()) descriptor.shadow = buffer->shadow() + 2 * binding.offset;
             }
             const bool has_texture =
                 binding.type != rhi::BindingType::sampler && !binding.buffer && !binding.acceleration_structure &&

@@ -14,6 +14,18 @@ Expected<std::unique_ptr<rhi::BackendBuffer>> CpuBuffer::create(const std::share
                     fmt::format("{} bytes could not be had: the device holds {} of the {} bytes of this machine",
                                 desc.size, memory->reserved_bytes(), memory->capacity()),
                     "Free other resources or use a smaller buffer.");
+    if (memory->shadows) {
+        if (desc.size > largest_shadowed_bytes)
+            return fail(ErrorCode::unsupported, "create buffer", fmt::format("'{}'", desc.name),
+                        fmt::format("expected at most {} bytes on a device in double precision, found {}",
+                                    largest_shadowed_bytes, desc.size),
+                        "Use a smaller buffer, or another mode of the backend.");
+        buffer->shadow_ = MemoryBlock(memory->shadows, (desc.size + 3) / 4 * 8);
+        if (!buffer->shadow_.data())
+            return fail(ErrorCode::out_of_memory, "create buffer", fmt::format("'{}'", desc.name),
+                        "there is no memory for its values in double precision",
+                        "Free other resources or use a smaller buffer.");
+    }
     buffer->desc = desc;
     if (desc.memory != rhi::MemoryKind::device) buffer->mapped = buffer->block_.data();
     buffer->memory_bytes = desc.size;

@@ -8,6 +8,9 @@
 
 namespace nacre::cpu {
 
+/// Of a buffer on a device in double precision: compiled code counts bytes of shadows in 32 bits with a sign.
+inline constexpr std::uint64_t largest_shadowed_bytes = std::uint64_t{1} << 30;
+
 /// Memory of the host, whatever the kind of memory that was asked for.
 class CpuBuffer : public rhi::BackendBuffer {
   public:
@@ -15,11 +18,13 @@ class CpuBuffer : public rhi::BackendBuffer {
                                                                 const rhi::BufferDesc& desc);
     [[nodiscard]] std::byte* data() const { return block_.data(); }
     [[nodiscard]] std::uint64_t size() const { return block_.size(); }
+    /// The double of each word, at twice its offset; null where the device is not in double precision.
+    [[nodiscard]] std::byte* shadow() const { return shadow_.data(); }
     /// Bytes from `offset` to the end; 0 for offsets behind it.
     [[nodiscard]] std::uint64_t size_from(std::uint64_t offset) const { return offset < size() ? size() - offset : 0; }
 
   private:
-    MemoryBlock block_;
+    MemoryBlock block_, shadow_;
 };
 
 }  // namespace nacre::cpu

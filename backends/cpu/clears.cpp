@@ -3,6 +3,7 @@
 #include <array>
 #include <cstring>
 
+#include "backends/cpu/images/double_texels.h"
 #include "backends/cpu/images/texel_formats.h"
 #include "backends/cpu/parallel_parts.h"
 #include "backends/cpu/texel_rows.h"
@@ -11,7 +12,7 @@
 namespace nacre::cpu {
 
 void Transfer::fill_plane(const std::array<ImageLevel, max_mips>& levels, const ImageView& view, const std::byte* texel,
-                          std::uint32_t texel_bytes) {
+                          std::uint32_t texel_bytes, const DoubleTexel& values) {
     for (std::uint32_t mip = 0; mip < view.mip_count; ++mip) {
         const ImageLevel& level = levels[mip];
         // Rows, slices and samples of a layer lie without gaps.
@@ -20,6 +21,9 @@ void Transfer::fill_plane(const std::array<ImageLevel, max_mips>& levels, const 
             std::byte* out = level.data + layer * level.layer_stride;
             in_parallel(scheduler_, layer_texels, texel_bytes, [&](std::uint64_t first, std::uint64_t count) {
                 fill_row(texel, texel_bytes, count, out + first * texel_bytes);
+                if (!level.shadow) return;
+                double* const doubles = level.shadow + (layer * level.layer_stride / texel_bytes + first) * 4;
+                for (std::uint64_t i = 0; i < count * 4; ++i) doubles[i] = values[i % 4];
             });
         }
     }
@@ -43,11 +47,20 @@ std::array<std::byte, 4> cleared_depth(rhi::Format format, float depth) {
 }
 
 void Transfer::clear_color(const ImageView& view, const rhi::ClearColor& color) {
-    fill_plane(view.levels, view, cleared_texel(view.format, color).data(), view.texel_bytes);
+    std::array<std::byte, 16> bytes = cleared_texel(view.format, color);
+    DoubleTexel values{};
+    if (view.levels[0].shadow) {
+        Texel texel{};
+        std::memcpy(&texel, &color, sizeof texel);
+        for (std::size_t c = 0; c < 4; ++c) values[c] = texel.f[c];
+        store_double(view.format, values, bytes.data(), values.data());
+    }
+    fill_plane(view.levels, view, bytes.data(), view.texel_bytes, values);
 }
 
 void Transfer::clear_depth(const ImageView& view, float depth) {
-    fill_plane(view.levels, view, cleared_depth(view.format, depth).data(), view.texel_bytes);
+    const double kept = depth > 0.0f ? std::min(depth, 1.0f) : 0.0f;
+    fill_plane(view.levels, view, cleared_depth(view.format, depth).data(), view.texel_bytes, {kept, 0.0, 0.0, 0.0});
 }
 
 void Transfer::clear_stencil(const ImageView& view, std::uint8_t stencil) {

@@ -37,7 +37,12 @@ class Executor {
     /// Returns an empty text, or why the device must be given up. May throw std::bad_alloc.
     std::string execute(const FlatPlan& plan);
 
+    /// From here on the shaders of `shader` tell what they compute; null: no more. Called while nothing is executed.
+    void set_trace(ShaderTrace* trace, std::string shader, Compiler* compiler);
+
   private:
+    [[nodiscard]] bool is_traced(const std::string& name) const;
+
     void execute(const rhi::CommandHeader& header, const std::byte* payload);
     void reset_state();
 
@@ -104,6 +109,9 @@ class Executor {
     std::uint32_t occlusion_index_ = 0;
     std::uint64_t passed_before_ = 0;
 
+    ShaderTrace* trace_ = nullptr;
+    std::string traced_shader_;
+    Compiler* compiler_ = nullptr;
     std::vector<MemoryBlock> workgroup_memory_;  ///< One for each thread.
     std::shared_ptr<HostMemory> scratch_;
 };

@@ -10,10 +10,11 @@
 namespace nacre::cpu {
 namespace {
 
-constexpr std::array<rhi::Backend::Mode, 3> all_modes{{
+constexpr std::array<rhi::Backend::Mode, 4> all_modes{{
     {"", "as fast"},
     {"fast", "multiplications and additions are fused where that helps"},
     {"consistent", "results do not depend on lanes or threads"},
+    {"double", "the reference: every float is a double, in registers and in memory"},
 }};
 
 constexpr std::uint32_t most_threads = 1024;
@@ -44,7 +45,9 @@ class CpuBackend : public rhi::Backend {
                           fmt::format("expected at most {} threads, found {}", most_threads, spec.threads),
                           "Leave threads out for one on each core.");
         DeviceOptions options;
-        options.mode = spec.mode == "consistent" ? ExecutionMode::consistent : ExecutionMode::fast;
+        options.mode = spec.mode == "consistent" ? ExecutionMode::consistent
+                       : spec.mode == "double"   ? ExecutionMode::double_precision
+                                                 : ExecutionMode::fast;
         options.lanes = spec.lanes != 0 ? spec.lanes : native_lanes();
         options.threads = spec.threads;
         return CpuDevice::create(options, desc);

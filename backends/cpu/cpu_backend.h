@@ -21,8 +21,9 @@
 namespace nacre::cpu {
 
 /// "cpu", with the modes "" and "fast" (fused multiply-add where it helps) and "consistent" (the same results whatever
-/// the lanes and threads). `lanes` are the invocations that run at once, 4, 8 or 16 (default: what the processor runs
-/// well); `threads` is the number of threads that work (default: one for each core).
+/// the lanes and threads) and "double" (every float a double, in registers and by shadow memory in buffers and images).
+/// `lanes` are the invocations that run at once, 4, 8 or 16 (default: what the processor runs well); `threads` is the
+/// number of threads that work (default: one for each core).
 std::unique_ptr<rhi::Backend> make_backend();
 
 }  // namespace nacre::cpu

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 #include <new>
 #include <system_error>
@@ -62,7 +63,14 @@ CpuDevice::CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc&
       compiler_(std::move(compiler)),
       scheduler_(Scheduler::create(options.threads)),
       watchdog_(watchdog_limit()),
-      executor_(*scheduler_, watchdog_, options.lanes) {}
+      executor_(*scheduler_, watchdog_, options.lanes) {
+    // Shadows take up to 8 times what they belong to, but only where shaders write does the system give them pages.
+    if (options.mode != ExecutionMode::double_precision) return;
+    capabilities_.float_bits = 53;
+    capabilities_.max_buffer_size = std::min(capabilities_.max_buffer_size, largest_shadowed_bytes);
+    capabilities_.max_storage_buffer_range = std::min(capabilities_.max_storage_buffer_range, largest_shadowed_bytes);
+    memory_->shadows = std::make_shared<HostMemory>(machine_memory_bytes() * 8);
+}
 
 Expected<std::unique_ptr<rhi::BackendDevice>> CpuDevice::create(const DeviceOptions& options,
                                                                 const rhi::BackendDeviceDesc& desc) try {
@@ -128,12 +136,19 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> CpuDevice::create_bind_group(
 Expected<std::unique_ptr<rhi::BackendGraphicsPipeline>> CpuDevice::create_graphics_pipeline(
     const rhi::BackendGraphicsPipelineDesc& desc) {
     NACRE_CHECK(check_lost("create graphics pipeline"));
-    return CpuGraphicsPipeline::create(*compiler_, desc);
+    NACRE_TRY(std::unique_ptr<rhi::BackendGraphicsPipeline> pipeline, CpuGraphicsPipeline::create(*compiler_, desc));
+    const RasterPipeline& raster = static_cast<CpuGraphicsPipeline&>(*pipeline).raster;
+    note_narrowed(raster.vertex.name, raster.vertex.narrowed);
+    note_narrowed(raster.fragment.name, raster.fragment.narrowed);
+    return pipeline;
 }
 Expected<std::unique_ptr<rhi::BackendComputePipeline>> CpuDevice::create_compute_pipeline(
     const rhi::BackendComputePipelineDesc& desc) {
     NACRE_CHECK(check_lost("create compute pipeline"));
-    return CpuComputePipeline::create(*compiler_, desc);
+    NACRE_TRY(std::unique_ptr<rhi::BackendComputePipeline> pipeline, CpuComputePipeline::create(*compiler_, desc));
+    const ComputeProgram& program = static_cast<CpuComputePipeline&>(*pipeline).program;
+    note_narrowed(program.name, program.narrowed);
+    return pipeline;
 }
 Expected<std::unique_ptr<rhi::BackendQueryPool>> CpuDevice::create_query_pool(const rhi::QueryPoolDesc& desc) {
     NACRE_CHECK(check_lost("create query pool"));
@@ -221,6 +236,39 @@ rhi::MemoryStatistics CpuDevice::memory_statistics() const {
     statistics.reserved_bytes = memory_->reserved_bytes();
     statistics.driver_allocations = memory_->allocations();
     return statistics;
+}
+
+void CpuDevice::note_narrowed(const std::string& shader, std::span<const NarrowedOperation> operations) {
+    const std::scoped_lock lock(narrowed_mutex_);
+    for (const NarrowedOperation& operation : operations)
+        narrowed_.insert({shader, operation.line, operation.operation});
+}
+
+std::vector<rhi::NarrowedOperation> CpuDevice::narrowed_operations() const {
+    const std::scoped_lock lock(narrowed_mutex_);
+    return {narrowed_.begin(), narrowed_.end()};
+}
+
+Expected<void> CpuDevice::start_trace(const rhi::TraceRequest& request) {
+    NACRE_CHECK(check_lost("trace shaders"));
+    queue_.drain();
+    trace_ = std::make_unique<ShaderTrace>();
+    // Fragment shaders are found by their pixel, compute shaders only by their own coordinates.
+    const auto invocation = request.invocation.value_or(std::array{request.x, request.y, ~0u});
+    std::ranges::copy(invocation, trace_->invocation);
+    std::ranges::copy(std::array{request.x, request.y, request.z}, trace_->texel);
+    executor_.set_trace(trace_.get(), request.shader, compiler_.get());
+    return {};
+}
+
+Expected<rhi::Trace> CpuDevice::finish_trace() {
+    NACRE_CHECK(check_lost("trace shaders"));
+    queue_.drain();
+    executor_.set_trace(nullptr, {}, nullptr);
+    if (!trace_) return rhi::Trace{};
+    rhi::Trace found = std::move(trace_->found);
+    trace_.reset();
+    return found;
 }
 
 Expected<void> CpuDevice::save_pipeline_cache() { return {}; }  // The compiler keeps what it compiles as it does so.

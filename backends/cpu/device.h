@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 
 #include "backends/cpu/commands.h"
@@ -59,6 +60,9 @@ class CpuDevice : public rhi::BackendDevice {
                                                       std::uint32_t count) override;
     [[nodiscard]] rhi::MemoryStatistics memory_statistics() const override;
     Expected<void> save_pipeline_cache() override;
+    [[nodiscard]] std::vector<rhi::NarrowedOperation> narrowed_operations() const override;
+    Expected<void> start_trace(const rhi::TraceRequest& request) override;
+    Expected<rhi::Trace> finish_trace() override;
 
   private:
     CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc& desc, std::unique_ptr<Compiler> compiler);
@@ -78,6 +82,10 @@ class CpuDevice : public rhi::BackendDevice {
     std::unique_ptr<Scheduler> scheduler_;
     Watchdog watchdog_;
     Executor executor_;  // Queue thread only.
+    std::unique_ptr<ShaderTrace> trace_;
+    void note_narrowed(const std::string& shader, std::span<const NarrowedOperation> operations);
+    mutable std::mutex narrowed_mutex_;
+    std::set<rhi::NarrowedOperation> narrowed_;
 
     mutable std::mutex mutex_;
     std::condition_variable changed_;

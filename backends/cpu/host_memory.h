@@ -29,6 +29,10 @@ class HostMemory {
     [[nodiscard]] std::uint32_t allocations() const { return live_; }
     [[nodiscard]] std::uint64_t capacity() const { return capacity_; }
 
+    /// Of devices in double precision: where buffers and textures take the memory of their shadows, the doubles of
+    /// their floats. It is counted apart, and most of it is never touched. Else null.
+    std::shared_ptr<HostMemory> shadows;
+
   private:
     friend class MemoryBlock;
     const std::uint64_t capacity_;

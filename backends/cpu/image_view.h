@@ -25,6 +25,9 @@ struct ImageLevel {
     std::uint32_t width = 0, height = 0, depth = 0;  ///< Texels.
     std::uint32_t row_stride = 0;                    ///< Bytes.
     std::uint64_t slice_stride = 0, layer_stride = 0, sample_stride = 0;
+    /// Of devices in double precision, else null: four doubles for each texel, those of the texel at data + n *
+    /// texel_bytes at shadow + 4 * n. See images/double_texels.h.
+    double* shadow = nullptr;
 };
 
 /// Views whose texels compiled code fetches by itself: one sample, one channel of 32 bits, offsets below 2^31 bytes.

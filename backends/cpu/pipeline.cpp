@@ -19,6 +19,12 @@ ShaderSource source_of(const rhi::BackendShader& shader, std::span<const rhi::Sp
             .slots = slots};
 }
 
+KeptShader kept(const rhi::BackendShader& shader, std::span<const rhi::SpecializationConstant> constants,
+                std::span<const BindingSlots> slots) {
+    return {{shader.spirv.begin(), shader.spirv.end()}, shader.entry_point,           shader.name,
+            {constants.begin(), constants.end()},       {slots.begin(), slots.end()}, {}};
+}
+
 std::unexpected<Error> out_of_memory(const std::string& name) {
     return fail(ErrorCode::out_of_memory, "create pipeline", fmt::format("'{}'", name),
                 "the memory ran out while its shaders were compiled", "Free other resources.");
@@ -31,9 +37,35 @@ Expected<std::unique_ptr<rhi::BackendComputePipeline>> CpuComputePipeline::creat
     const std::vector<BindingSlots> slots = slots_of(desc.layouts);
     auto pipeline = std::make_unique<CpuComputePipeline>();
     NACRE_TRY(pipeline->program, compiler.compile_compute(source_of(*desc.shader, desc.desc->specialization, slots)));
+    pipeline->shader_ = kept(*desc.shader, desc.desc->specialization, slots);
     return pipeline;
 } catch (const std::bad_alloc&) {
     return out_of_memory(desc.desc->name);
+}
+
+ShaderSource KeptShader::source(TraceTable* trace) const {
+    return {.spirv = spirv,
+            .entry_point = entry_point,
+            .name = name,
+            .specialization = constants,
+            .slots = slots,
+            .trace = trace};
+}
+
+const ComputeProgram* CpuComputePipeline::traced(Compiler& compiler) {
+    if (traced_) return traced_.get();
+    auto made = compiler.compile_compute(shader_.source(&shader_.table));
+    if (made) traced_ = std::make_unique<ComputeProgram>(*std::move(made));
+    return traced_.get();
+}
+
+const RasterPipeline* CpuGraphicsPipeline::traced(Compiler& compiler) {
+    if (traced_ || fragment_shader_.spirv.empty()) return traced_.get();
+    auto made = compiler.compile_fragment(fragment_shader_.source(&fragment_shader_.table));
+    if (!made) return nullptr;
+    traced_ = std::make_unique<RasterPipeline>(raster);
+    traced_->fragment = *std::move(made);
+    return traced_.get();
 }
 
 std::vector<std::uint32_t> link_inputs(const VertexProgram& vertex, const FragmentProgram& fragment) {
@@ -61,6 +93,7 @@ Expected<std::unique_ptr<rhi::BackendGraphicsPipeline>> CpuGraphicsPipeline::cre
     if (desc.fragment) {
         NACRE_TRY(raster.fragment, compiler.compile_fragment(source_of(*desc.fragment, wish.specialization, slots)));
         raster.input_slots = link_inputs(raster.vertex, raster.fragment);
+        pipeline->fragment_shader_ = kept(*desc.fragment, wish.specialization, slots);
         pipeline->shader_names += fmt::format(" with '{}'", desc.fragment->name);
     }
     raster.topology = wish.topology;

@@ -9,12 +9,29 @@
 
 namespace nacre::cpu {
 
+/// A shader as it was given, to be compiled once more where it is traced.
+struct KeptShader {
+    std::vector<std::uint32_t> spirv;
+    std::string entry_point, name;
+    std::vector<rhi::SpecializationConstant> constants;
+    std::vector<BindingSlots> slots;
+    TraceTable table;
+    [[nodiscard]] ShaderSource source(TraceTable* trace) const;
+};
+
 class CpuComputePipeline : public rhi::BackendComputePipeline {
   public:
     ComputeProgram program;
 
+    /// The program that tells what it computes; null where it cannot be compiled.
+    const ComputeProgram* traced(Compiler& compiler);
+
     static Expected<std::unique_ptr<rhi::BackendComputePipeline>> create(Compiler& compiler,
                                                                          const rhi::BackendComputePipelineDesc& desc);
+
+  private:
+    KeptShader shader_;
+    std::unique_ptr<ComputeProgram> traced_;
 };
 
 class CpuGraphicsPipeline : public rhi::BackendGraphicsPipeline {
@@ -22,8 +39,15 @@ class CpuGraphicsPipeline : public rhi::BackendGraphicsPipeline {
     RasterPipeline raster;
     std::string shader_names;  ///< Of vertex and fragment shader, for messages.
 
+    /// The same with a fragment shader that tells what it computes; null where there is none.
+    const RasterPipeline* traced(Compiler& compiler);
+
     static Expected<std::unique_ptr<rhi::BackendGraphicsPipeline>> create(Compiler& compiler,
                                                                           const rhi::BackendGraphicsPipelineDesc& desc);
+
+  private:
+    KeptShader fragment_shader_;
+    std::unique_ptr<RasterPipeline> traced_;
 };
 
 /// For each input of a fragment shader the slot of the vertex shader's output at that place; ~0u where there is none.

@@ -20,10 +20,17 @@ class CompiledCode {
     virtual ~CompiledCode() = default;
 };
 
+/// An instruction that goes through single precision although its device works in double precision.
+struct NarrowedOperation {
+    std::string line;       ///< "file:line" of the GLSL; empty where the module does not know.
+    std::string operation;  ///< "bit cast", "packing", ...
+};
+
 struct ComputeProgram {
     ComputeFunction run = nullptr;
     std::array<std::uint32_t, 3> workgroup_size{1, 1, 1};
     std::uint64_t workgroup_bytes = 0;  ///< Of WorkgroupRange::memory.
+    std::vector<NarrowedOperation> narrowed;
     std::string name;
     std::shared_ptr<CompiledCode> code;
 };
@@ -40,6 +47,8 @@ struct VertexProgram {
     bool writes_point_size = false;
     std::uint32_t clip_distances = 0, cull_distances = 0;
     bool has_side_effects = false;                 ///< Stores to buffers or images: every vertex runs exactly once an index.
+    bool in_double = false;                        ///< Also writes VertexBatch::doubles.
+    std::vector<NarrowedOperation> narrowed;
     std::string name;
     std::shared_ptr<CompiledCode> code;
 };
@@ -67,6 +76,8 @@ struct FragmentProgram {
     bool has_side_effects = false;    ///< Stores to buffers or images: runs after early tests only where `early_tests` says so.
     bool runs_per_sample = false;     ///< Reads gl_SampleID, gl_SamplePosition or an input declared `sample`.
     bool uses_centroid = false;
+    bool in_double = false;  ///< Reads the primitive's DoublePrimitive and also writes FragmentBatch::doubles.
+    std::vector<NarrowedOperation> narrowed;
     std::string name;
     std::shared_ptr<CompiledCode> code;
 };

@@ -18,7 +18,10 @@ void Executor::begin_render_pass(const rhi::BeginRenderPassCommand& command) {
         ImageView& view = targets_.colors.emplace_back();
         if (!color.view.texture.object) continue;
         view = texture_of(color.view.texture).make_view(color.view);
-        if (color.load == LoadOperation::clear) {
+        if (color.load == LoadOperation::clear && view.levels[0].shadow) {
+            // Doubles are cleared with their texels.
+            transfer_.clear_color(view, color.clear);
+        } else if (color.load == LoadOperation::clear) {
             targets_.color_clears.resize(command.color_count);
             targets_.color_clears[i] = cleared_texel(view.format, color.clear);
         }
@@ -27,7 +30,10 @@ void Executor::begin_render_pass(const rhi::BeginRenderPassCommand& command) {
     }
     if (command.has_depth_stencil) {
         targets_.depth_stencil = texture_of(command.depth_stencil.texture).make_view(command.depth_stencil);
-        if (command.depth_load == LoadOperation::clear && !command.read_only)
+        const bool clears_depth = command.depth_load == LoadOperation::clear && !command.read_only;
+        if (clears_depth && targets_.depth_stencil.levels[0].shadow)
+            transfer_.clear_depth(targets_.depth_stencil, command.clear_depth);
+        else if (clears_depth)
             targets_.depth_clear = cleared_depth(targets_.depth_stencil.format, command.clear_depth);
         if (command.stencil_load == LoadOperation::clear && !command.read_only)
             targets_.stencil_clear = command.clear_stencil;

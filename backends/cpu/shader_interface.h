@@ -16,6 +16,7 @@ namespace nacre::cpu {
 
 struct ImageView;
 struct SamplerState;
+struct ShaderTrace;
 
 inline constexpr std::uint32_t max_lanes = 16;
 inline constexpr std::uint32_t max_quads = max_lanes / 4;
@@ -30,7 +31,12 @@ struct Descriptor {
     std::byte* data;              ///< Buffers: first byte of the bound range, aligned to 16.
     std::uint64_t size;           ///< Buffers: bytes of the bound range.
     const ImageView* image;       ///< Textures and images.
-    const SamplerState* sampler;  ///< Samplers and combined texture samplers.
+    union {
+        const SamplerState* sampler;  ///< Samplers and combined texture samplers.
+        /// Buffers of devices in double precision: the double of each 32-bit word of the range, at twice the word's
+        /// offset.
+        std::byte* shadow;
+    };
 };
 static_assert(sizeof(Descriptor) == 32);
 
@@ -46,6 +52,7 @@ struct ShaderContext {
     std::uint32_t group_sizes[max_groups];  ///< Descriptors in each group (bounds unbounded arrays).
     const std::byte* push_constants;        ///< `push_constant_capacity` bytes, aligned to 16.
     ExecutionState* state;
+    ShaderTrace* trace;  ///< Of programs that are traced.
 };
 
 // ---- Compute -------------------------------------------------------------------------------------------------------------
@@ -67,6 +74,7 @@ using ComputeFunction = void (*)(const ShaderContext*, const WorkgroupRange*);
 struct VertexBufferBinding {
     const std::byte* data;  ///< Null where nothing is bound.
     std::uint64_t size;     ///< Bytes from `data` to the end of the buffer.
+    const std::byte* shadow;  ///< As Descriptor::shadow; null where the device is not in double precision.
 };
 
 /// What is the same for all vertices of a draw.
@@ -87,6 +95,7 @@ struct VertexBatch {
     std::uint32_t instance;            ///< gl_InstanceIndex: the first instance is added already.
     std::uint32_t count;               ///< Vertices that count; lanes behind them repeat a valid index.
     float* outputs;                    ///< `VertexProgram::output_slots` * max_lanes words, aligned to 64.
+    double* doubles;                   ///< In double precision, else null: slots of floats once more, as doubles.
 };
 using VertexFunction = void (*)(const ShaderContext*, const VertexDraw*, VertexBatch*, std::uint32_t batch_count);
 
@@ -122,6 +131,32 @@ struct alignas(16) PrimitiveData {
 };
 static_assert(sizeof(PrimitiveData) == 64);
 
+/// Planes in double precision; (x0, y0) as in DoublePrimitive.
+struct DoublePlane {
+    double c, dx, dy;
+};
+/// What fragment code of devices in double precision reads besides, at `double_primitive_offset` behind the
+/// PrimitiveData.
+struct alignas(16) DoublePrimitive {
+    double x0, y0;
+    double point_x, point_y, inverse_point_size;
+    double reserved;
+    DoublePlane
+        planes[2];  ///< Depth and 1 / w, followed by one for each FragmentProgram::inputs (of flat integers: nothing).
+    [[nodiscard]] DoublePlane* varyings() { return planes + 2; }
+};
+static_assert(sizeof(DoublePrimitive) == 96);
+/// Planes of varyings are padded to a multiple of four.
+[[gnu::always_inline]] constexpr std::size_t double_primitive_offset(std::size_t inputs) {
+    return sizeof(PrimitiveData) + (inputs + 3) / 4 * 4 * sizeof(Plane);
+}
+
+/// Results of fragment code in double precision: those of FragmentBatch that are floats.
+struct FragmentDoubles {
+    alignas(64) double depth[max_lanes];
+    alignas(64) double colors[max_color_outputs][4][max_lanes];
+};
+
 /// Up to `lanes` / 4 quads of 2x2 pixels, of one primitive or of several. Lane 4 * q + i is pixel (x[q] + (i & 1), y[q] + (i >> 1)).
 /// Quads that are not used repeat a valid primitive and have no live lane.
 struct FragmentBatch {
@@ -133,6 +168,7 @@ struct FragmentBatch {
     std::uint32_t sample_index;  ///< gl_SampleID, where the program runs for each sample.
     /// Where inside of the pixel the shader runs: (0.5, 0.5), or the sample's place where it runs for each sample.
     float sample_x, sample_y;
+    FragmentDoubles* doubles;                              ///< In double precision, else null.
     alignas(64) std::uint32_t sample_mask_in[max_lanes];   ///< gl_SampleMaskIn: covered samples.
     alignas(64) float centroid_x[max_lanes];               ///< Place inside of the pixel for centroid inputs; set where
     alignas(64) float centroid_y[max_lanes];               ///< FragmentProgram::uses_centroid.
@@ -192,6 +228,22 @@ struct ImageArguments {
     alignas(64) std::uint32_t result[4][max_lanes];       ///< Zero in lanes that are not live.
 };
 
+/// The same for devices in double precision and images of floats. Integer coordinates are given as doubles, which hold
+/// them exactly.
+struct DoubleImageArguments {
+    alignas(64) double coordinates[4][max_lanes];
+    double lod[max_lanes];
+    double reference[max_lanes];
+    double gradient_x[3][max_lanes];
+    double gradient_y[3][max_lanes];
+    double min_lod[max_lanes];
+    double texel[4][max_lanes];
+    std::int32_t offset[3][max_lanes];
+    std::int32_t sample[max_lanes];
+    std::int32_t gather_offsets[4][2];
+    alignas(64) double result[4][max_lanes];  ///< Zero in lanes that are not live.
+};
+
 }  // namespace nacre::cpu
 
 // Functions that compiled code calls. `flags` is an ImageOperation with ImageFlags. `live` has one bit for each lane; samples with
@@ -200,4 +252,8 @@ struct ImageArguments {
 extern "C" {
 using NacreCpuImageFunction = void (*)(const nacre::cpu::ImageView* image, const nacre::cpu::SamplerState* sampler,
                                        nacre::cpu::ImageArguments* arguments, std::uint32_t flags, std::uint32_t live);
+using NacreCpuDoubleImageFunction = void (*)(const nacre::cpu::ImageView* image,
+                                             const nacre::cpu::SamplerState* sampler,
+                                             nacre::cpu::DoubleImageArguments* arguments, std::uint32_t flags,
+                                             std::uint32_t live);
 }

@@ -52,7 +52,19 @@ ShaderContext Executor::make_context() {
     // Draws may be carried out after the values have changed; dispatches are over when they return.
     push_constants_in_use_ = in_pass_;
     context.state = &watchdog_.state();
+    context.trace = trace_;
     return context;
+}
+
+void Executor::set_trace(ShaderTrace* trace, std::string shader, Compiler* compiler) {
+    trace_ = trace;
+    traced_shader_ = std::move(shader);
+    compiler_ = compiler;
+}
+
+bool Executor::is_traced(const std::string& name) const {
+    return trace_ && (name == traced_shader_ || name.starts_with(traced_shader_ + "/") ||
+                      name.find("/" + traced_shader_ + "/") != std::string::npos);
 }
 
 void Executor::look_at_watchdog(const std::string& shader) {
@@ -66,11 +78,15 @@ void Executor::draw(const DrawCall& call, std::uint32_t draw_index) {
     if (call.count == 0 || call.instance_count == 0 || !pipeline_ || !in_pass_) return;
     DrawState state;
     state.pipeline = &pipeline_->raster;
+    if (is_traced(state.pipeline->fragment.name))
+        if (const RasterPipeline* traced = pipeline_->traced(*compiler_)) state.pipeline = traced;
     state.context = make_context();
     for (std::size_t i = 0; i < vertex_buffers_.size(); ++i) {
         const VertexBuffer& bound = vertex_buffers_[i];
         const std::uint64_t size = bound.buffer ? bound.buffer->size_from(bound.offset) : 0;
-        if (size != 0) state.vertex.buffers[i] = {bound.buffer->data() + bound.offset, size};
+        if (size != 0)
+            state.vertex.buffers[i] = {bound.buffer->data() + bound.offset, size,
+                                       bound.buffer->shadow() ? bound.buffer->shadow() + 2 * bound.offset : nullptr};
     }
     state.vertex.base_vertex = call.indexed ? call.vertex_offset : static_cast<std::int32_t>(call.first);
     state.vertex.base_instance = call.first_instance;
@@ -138,7 +154,9 @@ void Executor::dispatch_indirect(const rhi::DispatchIndirectCommand& command) {
 
 void Executor::dispatch(rhi::DispatchArguments groups) {
     if (!compute_pipeline_) return;
-    const ComputeProgram& program = compute_pipeline_->program;
+    const ComputeProgram* traced =
+        is_traced(compute_pipeline_->program.name) ? compute_pipeline_->traced(*compiler_) : nullptr;
+    const ComputeProgram& program = traced ? *traced : compute_pipeline_->program;
     // Indirect arguments are whatever lies in the buffer; the limits keep the total within 64 bits.
     groups.x = std::min(groups.x, most_workgroups[0]);
     groups.y = std::min(groups.y, most_workgroups[1]);

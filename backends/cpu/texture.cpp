@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "backends/cpu/images/double_texels.h"
+
 namespace nacre::cpu {
 namespace {
 
@@ -36,6 +38,12 @@ rhi::ViewDimension whole_dimension(const rhi::TextureDesc& desc) {
         case rhi::TextureDimension::cube: return rhi::ViewDimension::cube_array;
     }
     return rhi::ViewDimension::d2_array;
+}
+
+/// Textures that are only copied to and sampled hold what the host gave, which their format holds exactly.
+bool is_written_by_shaders(rhi::TextureUsage usage) {
+    return (usage & (rhi::TextureUsage::color_target | rhi::TextureUsage::depth_target | rhi::TextureUsage::storage)) !=
+           rhi::TextureUsage::none;
 }
 
 }  // namespace
@@ -74,6 +82,17 @@ Expected<std::unique_ptr<rhi::BackendTexture>> CpuTexture::create(const std::sha
         whole.levels[mip].data = data + offsets[mip];
         if (facts.has_stencil) whole.stencil_levels[mip].data = data + stencil_offsets[mip];
     }
+    if (memory->shadows && is_written_by_shaders(desc.usage) && has_shadow(desc.format)) {
+        constexpr std::uint64_t doubles_of_texel = 4;
+        texture->shadow_ = MemoryBlock(memory->shadows, bytes / whole.texel_bytes * doubles_of_texel * sizeof(double));
+        auto* const doubles = reinterpret_cast<double*>(texture->shadow_.data());
+        if (!doubles)
+            return fail(ErrorCode::out_of_memory, "create texture", fmt::format("'{}'", desc.name),
+                        "there is no memory for its values in double precision",
+                        "Free other resources or use a smaller texture.");
+        for (std::uint32_t mip = 0; mip < desc.mips; ++mip)
+            whole.levels[mip].shadow = doubles + offsets[mip] / whole.texel_bytes * doubles_of_texel;
+    }
     texture->memory_bytes = bytes;
     return texture;
 }
@@ -90,6 +109,7 @@ ImageView CpuTexture::make_view(const rhi::ViewReference& reference) const {
         const auto part = [&](const ImageLevel& from) {
             ImageLevel level = from;
             if (level.data) level.data += level.layer_stride * reference.base_layer;
+            if (level.shadow) level.shadow += level.layer_stride * reference.base_layer / whole_.texel_bytes * 4;
             return level;
         };
         view.levels[mip] = part(whole_.levels[reference.base_mip + mip]);

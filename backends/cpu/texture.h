@@ -37,7 +37,7 @@ class CpuTexture : public rhi::BackendTexture {
         auto operator<=>(const ViewKey&) const = default;
     };
 
-    MemoryBlock block_;
+    MemoryBlock block_, shadow_;
     ImageView whole_{};
     std::map<ViewKey, std::unique_ptr<ImageView>> views_;
 };

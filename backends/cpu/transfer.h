@@ -43,8 +43,11 @@ class Transfer {
     void resolve(const ImageView& source, const ImageView& destination, std::uint32_t width, std::uint32_t height);
 
   private:
+    void copy_bytes(const std::byte* from, std::byte* to, std::uint64_t size);
+    /// @param values  what the texel stands for, for levels with doubles
     void fill_plane(const std::array<ImageLevel, max_mips>& levels, const ImageView& view, const std::byte* texel,
-                    std::uint32_t texel_bytes);
+                    std::uint32_t texel_bytes, const std::array<double, 4>& values = {});
+    void generate_double_mip(const ImageView& view, std::uint32_t mip);
 
     Scheduler& scheduler_;
 };

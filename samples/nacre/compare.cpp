@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <map>
+#include <set>
 
 #include "samples/nacre/backends.h"
 #include "samples/nacre/commands.h"
@@ -18,6 +22,47 @@ std::string texture_text(const measure::BackendResult& result) {
                    figure_text(texture.max_abs), figure_text(texture.max_rel)});
     }
     return table.text();
+}
+
+// How wrong single precision is, and where the largest error begins.
+std::string error_text(const measure::BackendResult& result) {
+    TextTable table(
+        {"numerical error of", "largest", "of largest value", "relative", "RMS", "at", "field", "double", "single"});
+    for (const measure::NumericalError& error : result.errors) {
+        const measure::WrongValue& at = error.largest;
+        const std::string place = at.layer == 0 && at.mip == 0
+                                      ? fmt::format("{}, {}", at.x, at.y)
+                                      : fmt::format("{}, {} layer {} mip {}", at.x, at.y, at.layer, at.mip);
+        table.add({error.texture, figure_text(at.error), figure_text(error.share()), figure_text(error.max_rel),
+                   figure_text(error.rms), at.error > 0 ? place : "-", at.error > 0 ? at.name : "-",
+                   fmt::format("{:.9g}", at.reference), fmt::format("{:.9g}", at.value)});
+    }
+    std::string text = table.text();
+    if (const measure::NumericalError* const largest = measure::SceneComparison::largest_error(result)) {
+        text += fmt::format("Largest: {} at pixel {}, {}.\n", largest->texture, largest->largest.x, largest->largest.y);
+        if (!result.no_origin.empty()) text += fmt::format("Where it begins cannot be told: {}\n", result.no_origin);
+        if (result.origin)
+            text += fmt::format("{} begins at {}.\n",
+                                result.no_origin.empty() ? "It" : "The largest of " + result.origin_of,
+                                result.origin->text);
+    }
+    if (result.earlier_origin)
+        text += fmt::format("What came in is of {} and begins at {}.\n", result.earlier_origin_of,
+                            result.earlier_origin->text);
+    for (const measure::NumericalError& error : result.errors)
+        if (error.flips > 0)
+            text += fmt::format("{} texels of {} show another surface and are left out.\n", error.flips, error.texture);
+    return text;
+}
+
+std::string narrowed_text(const std::vector<rhi::NarrowedOperation>& operations) {
+    std::map<std::string, std::set<std::string>> lines;
+    for (const rhi::NarrowedOperation& operation : operations)
+        lines[operation.operation].insert(operation.line.empty() ? operation.shader : operation.line);
+    std::string text;
+    for (const auto& [operation, places] : lines)
+        text += fmt::format("Through single precision in both, {}: {}\n", operation, fmt::join(places, ", "));
+    return text;
 }
 
 std::string summary(const measure::SceneComparison& comparison) {
@@ -54,7 +99,9 @@ Outcome run(const CompareArguments& arguments) {
         if (result.textures.empty()) continue;
         text += fmt::format("{} against {}\n{}\n", result.backend, comparison.backends.front().backend,
                             texture_text(result));
+        if (!result.errors.empty()) text += error_text(result) + "\n";
     }
+    text += narrowed_text(comparison.narrowed);
     text += summary(comparison);
     for (const std::string& violation : violations) text += fmt::format("over the tolerance: {}\n", violation);
     if (violations.empty()) text += "The backends agree within the tolerance.\n";

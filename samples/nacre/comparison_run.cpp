@@ -23,7 +23,8 @@ Attempt<measure::SceneComparison> run_comparison(const SceneSession& scene, cons
     }
     std::vector<measure::Contestant> contestants;
     for (RenderSession& session : sessions) {
-        contestants.push_back({session.backend, session.device->adapter().name, *session.renderer});
+        contestants.push_back(
+            {session.backend, session.device->adapter().name, *session.renderer, session.device.get()});
     }
     Progress progress(fmt::format("comparing {} on {}", scene.arguments().scene, fmt::join(backends, ", ")));
     NACRE_TRY(measure::SceneComparison comparison,

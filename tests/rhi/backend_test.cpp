@@ -78,6 +78,7 @@ std::span<const Variant> all_variants() {
     static const std::array variants{
         Variant{"cpu", "cpu:consistent", "none", "cpu:consistent"},
         Variant{"cpu_fast_8", "cpu:fast:lanes=8", "none", "cpu:fast:lanes=8"},
+        Variant{"cpu_double", "cpu:double", "none", "cpu:double"},
         Variant{"vulkan", "vulkan", "none", "vulkan"},
         Variant{"vulkan_renderpass", "vulkan:renderpass", "none", "vulkan:renderpass"},
         Variant{"gl", "gl", "none", "gl"},

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/cpu/compiler/code.h"
 
-#include <atomic>
-#include <cmath>
-#include <mutex>
-
 #include <fmt/format.h>
 #include <llvm/Analysis/CGSCCPassManager.h>
 #include <llvm/Analysis/LoopAnalysisManager.h>
@@ -28,12 +24,18 @@
 #include <llvm/Transforms/Scalar/GVN.h>
 #include <llvm/Transforms/Scalar/LICM.h>
 #include <llvm/Transforms/Scalar/LoopPassManager.h>
-#include <llvm/Transforms/Scalar/SROA.h>
 #include <llvm/Transforms/Scalar/SimplifyCFG.h>
+#include <llvm/Transforms/Scalar/SROA.h>
 
+#include <atomic>
+#include <cmath>
+#include <mutex>
+
+#include "backends/cpu/images/double_operations.h"
 #include "backends/cpu/images/image_operations.h"
 #include "backends/cpu/rays/ray_query.h"
 #include "backends/cpu/shader_interface.h"
+#include "backends/cpu/trace.h"
 
 namespace nacre::cpu {
 namespace {
@@ -204,10 +206,14 @@ class OrcGenerator final : public CodeGenerator {
             symbols[jit_->mangleAndIntern(symbol)] = {llvm::orc::ExecutorAddr::fromPtr(function), llvm::JITSymbolFlags::Exported | llvm::JITSymbolFlags::Callable};
         };
         define("nacre_cpu_image", image_function(lanes_));
+        define("nacre_cpu_double_image", double_image_function());
         define("nacre_cpu_ray_proceed", ray_proceed_function());
         define("nacre_cpu_ray_confirm", ray_confirm_function());
         define("nacre_cpu_ray_generate", ray_generate_function());
         define("nacre_cpu_ray_property", ray_property_function());
+        define("nacre_cpu_trace_begin", trace_functions().begin);
+        define("nacre_cpu_trace_event", trace_functions().event);
+        define("nacre_cpu_trace_write", trace_functions().write);
         // What LLVM and the functions in double precision call.
         using One = double (*)(double);
         using Two = double (*)(double, double);

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/cpu/compiler/compiler.h"
 
-#include <cstdlib>
-#include <cstring>
-
 #include <fmt/format.h>
 #include <llvm/IR/LLVMContext.h>
 #include <llvm/Support/raw_ostream.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <map>
 
 #include "backends/cpu/compiler/code.h"
 #include "backends/cpu/compiler/legalization.h"
@@ -36,13 +37,18 @@ class ShaderCompilation final : public Compiler {
         std::uint32_t subgroups = 1;
         bool has_barriers = false;
         const Variant& how = source.reflection && source.reflection->uses_subgroups && subgroups_.generator ? subgroups_ : all_;
-        NACRE_TRY(program.code, compile(how, source, spv::ExecutionModel::GLCompute, {}, [&](llvm::Module& target, const Module& module) {
-                      ComputeEmitter emitter(target, module, how.options, source.slots);
-                      emitter.emit();
-                      program.workgroup_size = module.workgroup_size;
-                      workgroup_bytes = emitter.workgroup_bytes, subgroups = emitter.subgroups, has_barriers = emitter.has_barriers;
-                      return has_barriers;
-                  }));
+        std::vector<NarrowedOperation> narrowed;
+        NACRE_TRY(program.code, compile(how, source, spv::ExecutionModel::GLCompute, {}, narrowed,
+                                        [&](llvm::Module& target, const Module& module) {
+                                            ComputeEmitter emitter(target, module, how.options, source.slots);
+                                            emitter.trace_table = source.trace;
+                                            emitter.emit();
+                                            program.workgroup_size = module.workgroup_size;
+                                            workgroup_bytes = emitter.workgroup_bytes, subgroups = emitter.subgroups;
+                                            has_barriers = emitter.has_barriers;
+                                            return Emitted{has_barriers, emitter.narrowed()};
+                                        }));
+        program.narrowed = std::move(narrowed);
         auto& code = static_cast<LoadedCode&>(*program.code);
         program.run = reinterpret_cast<ComputeFunction>(code.find("kernel"));
         if (!program.run) return missing(source);
@@ -60,12 +66,16 @@ class ShaderCompilation final : public Compiler {
     Expected<VertexProgram> compile_vertex(const ShaderSource& source, const VertexInput& input) override {
         VertexProgram program;
         std::shared_ptr<CompiledCode> code;
-        NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Vertex, input, [&](llvm::Module& target, const Module& module) {
-                      VertexEmitter emitter(target, module, all_.options, source.slots, input);
-                      emitter.emit();
-                      program = emitter.program;
-                      return false;
-                  }));
+        std::vector<NarrowedOperation> narrowed;
+        NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Vertex, input, narrowed,
+                                [&](llvm::Module& target, const Module& module) {
+                                    VertexEmitter emitter(target, module, all_.options, source.slots, input);
+                                    emitter.emit();
+                                    program = emitter.program;
+                                    return Emitted{false, emitter.narrowed()};
+                                }));
+        program.in_double = all_.options.mode == ExecutionMode::double_precision;
+        program.narrowed = std::move(narrowed);
         program.name = std::string(source.name);
         program.run = reinterpret_cast<VertexFunction>(static_cast<LoadedCode&>(*code).find("kernel"));
         program.code = std::move(code);
@@ -76,12 +86,17 @@ class ShaderCompilation final : public Compiler {
     Expected<FragmentProgram> compile_fragment(const ShaderSource& source) override {
         FragmentProgram program;
         std::shared_ptr<CompiledCode> code;
-        NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Fragment, {}, [&](llvm::Module& target, const Module& module) {
-                      FragmentEmitter emitter(target, module, all_.options, source.slots);
-                      emitter.emit();
-                      program = emitter.program;
-                      return false;
-                  }));
+        std::vector<NarrowedOperation> narrowed;
+        NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Fragment, {}, narrowed,
+                                [&](llvm::Module& target, const Module& module) {
+                                    FragmentEmitter emitter(target, module, all_.options, source.slots);
+                                    emitter.trace_table = source.trace;
+                                    emitter.emit();
+                                    program = emitter.program;
+                                    return Emitted{false, emitter.narrowed()};
+                                }));
+        program.in_double = all_.options.mode == ExecutionMode::double_precision;
+        program.narrowed = std::move(narrowed);
         program.name = std::string(source.name);
         program.run = reinterpret_cast<FragmentFunction>(static_cast<LoadedCode&>(*code).find("kernel"));
         program.code = std::move(code);
@@ -95,18 +110,24 @@ class ShaderCompilation final : public Compiler {
                     "Purge the cache (nacre cache --purge) and try again.");
     }
 
-    /// Runs `emit` on a new LLVM module and makes code of it; `emit` tells whether it has coroutines.
+    struct Emitted {
+        bool has_coroutines = false;
+        std::map<std::uint32_t, std::string> narrowed;
+    };
+
+    /// Runs `emit`, which gives an Emitted, on a new LLVM module and makes code of it.
     template <typename Emit>
     Expected<std::shared_ptr<CompiledCode>> compile(const Variant& how, const ShaderSource& source, spv::ExecutionModel model,
-                                                    const VertexInput& input, Emit&& emit) {
+                                                    const VertexInput& input, std::vector<NarrowedOperation>& narrowed,
+                                                    Emit&& emit) {
         NACRE_TRY(const std::vector<std::uint32_t> words, legalize(source.spirv, source.specialization, source.name));
         NACRE_TRY(const Module module, Module::parse(words, source.entry_point, model, source.name));
         llvm::LLVMContext context;
         auto target = std::make_unique<llvm::Module>("shader", context);
         how.generator->prepare(*target);
-        bool has_coroutines = false;
+        Emitted emitted;
         try {
-            has_coroutines = emit(*target, module);
+            emitted = emit(*target, module);
         } catch (const EmitError& error) {
             const std::string line = rhi::spirv::source_line(words, error.offset);
             return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", source.name),
@@ -116,6 +137,8 @@ class ShaderCompilation final : public Compiler {
             return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", source.name),
                         "the module refers to something in a way that the CPU backend does not know", "Use another backend.");
         }
+        for (const auto& [offset, operation] : emitted.narrowed)
+            narrowed.push_back({rhi::spirv::source_line(words, offset), operation});
         if (const char* dump = std::getenv("NACRE_CPU_DUMP")) {
             std::error_code problem;
             std::string file(source.name);
@@ -124,13 +147,20 @@ class ShaderCompilation final : public Compiler {
             llvm::raw_fd_ostream out(fmt::format("{}/{}.ll", dump, file), problem);
             if (!problem) target->print(out, nullptr);
         }
+        if (source.trace) {
+            source.trace->shader = source.name;
+            for (std::size_t i = 0; i < source.trace->offsets.size(); ++i)
+                source.trace->instructions[i].line = rhi::spirv::source_line(words, source.trace->offsets[i]);
+        }
+        // Code that is traced refers to addresses of this process.
+        const bool use_disk_cache = how.options.use_disk_cache && !source.trace;
         const Hash128 key = key_of(how, words, source, model, input);
         std::vector<std::byte> object;
-        if (how.options.use_disk_cache)
+        if (use_disk_cache)
             if (auto found = cache_.load("cpu", key)) object = std::move(*found);
         if (object.empty()) {
-            NACRE_TRY(object, how.generator->compile(*target, std::string(source.name), has_coroutines));
-            if (how.options.use_disk_cache) cache_.store("cpu", key, object);
+            NACRE_TRY(object, how.generator->compile(*target, std::string(source.name), emitted.has_coroutines));
+            if (use_disk_cache) cache_.store("cpu", key, object);
         }
         NACRE_TRY(std::shared_ptr<LoadedCode> code, how.generator->load(std::move(object), std::string(source.name)));
         return std::shared_ptr<CompiledCode>(std::move(code));

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "backends/cpu/program.h"
+#include "backends/cpu/trace.h"
 #include "core/error.h"
 #include "rhi/pipeline.h"
 #include "rhi/reflection.h"
@@ -23,6 +24,9 @@ namespace nacre::cpu {
 enum class ExecutionMode : std::uint8_t {
     consistent,  ///< No contraction; results do not depend on lanes or threads.
     fast,        ///< Contraction to fused multiply-add.
+    /// The reference: floats of 16 and 32 bits are doubles in registers, and by shadow memory in buffers, images and
+    /// between the stages. No contraction.
+    double_precision,
 };
 
 struct CompilerOptions {
@@ -46,6 +50,8 @@ struct ShaderSource {
     const rhi::ShaderReflection* reflection = nullptr;
     std::span<const rhi::SpecializationConstant> specialization;
     std::span<const BindingSlots> slots;
+    /// Not null: the program tells what it computes, and this, which it refers to, is filled.
+    TraceTable* trace = nullptr;
 };
 
 /// Vertex input, known when a pipeline is made.

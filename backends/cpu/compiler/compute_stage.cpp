@@ -87,6 +87,22 @@ void ComputeEmitter::emit_subgroup_body(llvm::Value* subgroup) {
     mask = all_lanes();
     if (total % lanes != 0) mask = builder.CreateICmpULT(index.value, splat(int32(total)));
     llvm::Value* const entry_mask = mask;
+    if (trace_table) {
+        const std::array<llvm::Value*, 3> group{
+            group_x, invariant_load(builder.getInt32Ty(), at_offset(range, offsetof(WorkgroupRange, y)), 4),
+            invariant_load(builder.getInt32Ty(), at_offset(range, offsetof(WorkgroupRange, z)), 4)};
+        llvm::Value* wanted = load_context(offsetof(ShaderContext, trace), pointer_type);
+        std::vector<Component> ids;
+        llvm::Value* is_traced = mask;
+        for (std::size_t i = 0; i < 3; ++i) {
+            ids.push_back(Component(widen(add(local_id[i], Component(builder.CreateMul(group[i], int32(size[i])))))));
+            llvm::Value* coordinate = invariant_load(
+                builder.getInt32Ty(),
+                at_offset(wanted, static_cast<std::int64_t>(offsetof(ShaderTrace, invocation) + 4 * i)), 4);
+            is_traced = both(is_traced, builder.CreateICmpEQ(ids.back().value, splat(coordinate)));
+        }
+        begin_trace(is_traced, std::move(ids));
+    }
     declare_variables();
     emit_function(module.entry(), {}, entry_mask);
 }

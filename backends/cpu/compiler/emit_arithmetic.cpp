@@ -370,22 +370,20 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
             llvm::Type* to = scalar_type(scalar_of(type_id));
             return unary([&](auto* x) { return math.convert_float(x, to); });
         }
-        case Op::OpQuantizeToF16: return unary([&](auto* x) { return math.quantize_to_f16(x); });
+        case Op::OpQuantizeToF16:
+            note_narrowed("rounding to 16 bits");
+            return unary([&](auto* x) { return math.quantize_to_f16(x); });
         case Op::OpBitcast: {
             const Value from = get(operands[0]);
             if (from.pointer || module.type(type_id).kind == TypeKind::pointer) reject("casts of pointers are not supported");
             const Type &source = scalar_of(operand_type(0)), &to = scalar_of(type_id);
-            llvm::Type* kind = scalar_type(to);
-            std::vector<Component> made;
-            const auto cast = [&](llvm::Value* x, llvm::Type* scalar) {
-                return builder.CreateBitCast(x, like(x, scalar));
+            const auto is_narrow = [](const Type& scalar) {
+                return scalar.kind == TypeKind::floating && scalar.bits < 64;
             };
+            if (is_narrow(source) || is_narrow(to)) note_narrowed("bit cast");
+            std::vector<Component> made;
             if (source.bits == to.bits) {
-                for (const Component& x : from.components) {
-                    Component same = cast(x.value, kind);
-                    if (source.kind == TypeKind::integer && to.kind == TypeKind::integer) same = x;
-                    made.push_back(same);
-                }
+                for (const Component& x : from.components) made.push_back(of_bits(bits_of(x, source), to));
                 return made;
             }
             // Components of different widths: lower-numbered components are the lower bits.
@@ -394,27 +392,25 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
                 for (std::size_t i = 0; i + parts <= from.components.size(); i += parts) {
                     Component whole;
                     for (std::uint32_t k = 0; k < parts; ++k) {
-                        Component part = apply({from.components[i + k]}, [&](Values v) {
-                            llvm::Value* bits = cast(v[0], builder.getIntNTy(source.bits));
+                        Component part = apply({bits_of(from.components[i + k], source)}, [&](Values v) {
                             llvm::Type* wide = builder.getIntNTy(to.bits);
-                            bits = builder.CreateZExt(bits, like(bits, wide));
+                            llvm::Value* bits = builder.CreateZExt(v[0], like(v[0], wide));
                             return k ? builder.CreateShl(bits, k * source.bits) : bits;
                         });
                         whole = whole ? apply({whole, part}, [&](Values v) { return builder.CreateOr(v[0], v[1]); }) : part;
                     }
-                    made.push_back(apply({whole}, [&](Values v) { return cast(v[0], kind); }));
+                    made.push_back(of_bits(whole, to));
                 }
             } else {
                 const std::uint32_t parts = source.bits / to.bits;
                 for (const Component& x : from.components)
-                    for (std::uint32_t k = 0; k < parts; ++k)
-                        made.push_back(apply({x}, [&](Values v) {
-                            llvm::Value* bits = cast(v[0], builder.getIntNTy(source.bits));
-                            if (k) bits = builder.CreateLShr(bits, k * to.bits);
-                            llvm::Type* narrow_type = builder.getIntNTy(to.bits);
-                            bits = builder.CreateTrunc(bits, like(bits, narrow_type));
-                            return cast(bits, kind);
-                        }));
+                    for (std::uint32_t k = 0; k < parts; ++k) {
+                        const Component part = apply({bits_of(x, source)}, [&](Values v) {
+                            llvm::Value* bits = k ? builder.CreateLShr(v[0], k * to.bits) : v[0];
+                            return builder.CreateTrunc(bits, like(bits, builder.getIntNTy(to.bits)));
+                        });
+                        made.push_back(of_bits(part, to));
+                    }
             }
             return made;
         }

@@ -77,11 +77,15 @@ bool Emitter::emit_atomic(const Instruction& at) {
     const Pointer pointer = get_pointer(at.operand(0));
     const Id value_type = is_store ? module.type_of(at.operand(3)) : at.type;
     const Type& scalar = module.type(value_type);
-    llvm::Type* kind = scalar_type(scalar);
+    const bool is_narrowed = in_double() && scalar.kind == TypeKind::floating && scalar.bits == 32;
+    if (is_narrowed) note_narrowed("atomic operation");
+    llvm::Type* kind = is_narrowed ? builder.getFloatTy() : scalar_type(scalar);
+    const auto finish = [&](const Component& old) { set(at, {is_narrowed ? from_single(old) : old}); };
     Component value, comparator;
     if (is_store || (operation && !is_constant_one)) value = get_scalar(at.operand(3));
     if (is_constant_one) value = llvm::ConstantInt::get(kind, 1);
     if (is_exchange_if) value = get_scalar(at.operand(4)), comparator = get_scalar(at.operand(5));
+    if (is_narrowed && value) value = to_single(value);
 
     if (pointer.kind == Pointer::Kind::texel) {
         if (is_negated) value = apply({value}, [&](auto v) { return builder.CreateNeg(v[0]); });
@@ -92,14 +96,14 @@ bool Emitter::emit_atomic(const Instruction& at) {
             texel = image_call(pointer.image_descriptor, Component(), pointer.image_type, pointer.coordinates,
                                static_cast<std::uint32_t>(is_load ? ImageOperation::load : ImageOperation::store) | image_integer_flag(pointer.image_type),
                                texel, pointer.sample);
-            if (is_load) set(at, {from_word(texel.at(0), kind)});
+            if (is_load) finish(from_word(texel.at(0), kind));
             return true;
         }
         set_image_atomic(image_operation, comparator);
         const std::vector<Component> old =
             image_call(pointer.image_descriptor, Component(), pointer.image_type, pointer.coordinates,
                        static_cast<std::uint32_t>(ImageOperation::atomic) | image_integer_flag(pointer.image_type), {value}, pointer.sample);
-        set(at, {from_word(old.at(0), kind)});
+        finish(from_word(old.at(0), kind));
         return true;
     }
     if (pointer.kind != Pointer::Kind::bytes) reject("an atomic operation on memory that is not shared");
@@ -136,7 +140,7 @@ bool Emitter::emit_atomic(const Instruction& at) {
             builder.CreateStore(builder.CreateInsertElement(all, old, lane), results);
         }
     });
-    if (at.result) set(at, {Component(builder.CreateLoad(vector_of(kind), results))});
+    if (at.result) finish(Component(builder.CreateLoad(vector_of(kind), results)));
     return true;
 }
 

@@ -411,6 +411,7 @@ void Emitter::emit_block(std::uint32_t index, llvm::Value* block_mask) {
             set_pointer(block.phis[i], std::move(components), origin);
             continue;
         }
+        trace_result(block.phis[i], components);
         define(block.phis[i].result).components = std::move(components);
         finish_definition(block.phis[i].result);
     }

@@ -202,6 +202,7 @@ bool Emitter::emit_extended(const Instruction& at) {
         }
 
         case GLSLstd450PackSnorm4x8: case GLSLstd450PackUnorm4x8: {
+            note_narrowed("packing");
             std::vector<Component> x = argument(0).components;
             set(at, {apply(x, [&](Values v) {
                     const std::array<llvm::Value*, 4> four{v[0], v[1], v[2], v[3]};
@@ -210,6 +211,7 @@ bool Emitter::emit_extended(const Instruction& at) {
             return true;
         }
         case GLSLstd450PackSnorm2x16: case GLSLstd450PackUnorm2x16: case GLSLstd450PackHalf2x16: case GLSLstd450PackDouble2x32: {
+            if (number != GLSLstd450PackDouble2x32) note_narrowed("packing");
             std::vector<Component> x = argument(0).components;
             set(at, {apply(x, [&](Values v) {
                     const std::array<llvm::Value*, 2> two{v[0], v[1]};
@@ -221,18 +223,25 @@ bool Emitter::emit_extended(const Instruction& at) {
             return true;
         }
         case GLSLstd450UnpackSnorm4x8: case GLSLstd450UnpackUnorm4x8: {
+            note_narrowed("unpacking");
             const Component word = argument(0).components.at(0);
             const auto four = number == GLSLstd450UnpackSnorm4x8 ? math.unpack_snorm4x8(word.value) : math.unpack_unorm4x8(word.value);
-            set(at, {four.begin(), four.end()});
+            std::vector<Component> made;
+            for (llvm::Value* component : four) made.push_back(from_single(component));
+            set(at, std::move(made));
             return true;
         }
         case GLSLstd450UnpackSnorm2x16: case GLSLstd450UnpackUnorm2x16: case GLSLstd450UnpackHalf2x16: case GLSLstd450UnpackDouble2x32: {
+            if (number != GLSLstd450UnpackDouble2x32) note_narrowed("unpacking");
             const Component word = argument(0).components.at(0);
             const auto two = number == GLSLstd450UnpackSnorm2x16   ? math.unpack_snorm2x16(word.value)
                              : number == GLSLstd450UnpackUnorm2x16 ? math.unpack_unorm2x16(word.value)
                              : number == GLSLstd450UnpackHalf2x16  ? math.unpack_half2x16(word.value)
                                                                    : math.unpack_double2x32(word.value);
-            set(at, {two.begin(), two.end()});
+            std::vector<Component> made;
+            for (llvm::Value* component : two)
+                made.push_back(number == GLSLstd450UnpackDouble2x32 ? Component(component) : from_single(component));
+            set(at, std::move(made));
             return true;
         }
 

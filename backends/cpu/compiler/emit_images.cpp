@@ -57,6 +57,8 @@ std::uint32_t Emitter::image_integer_flag(Id image_type) const {
 Component Emitter::from_word(const Component& word, llvm::Type* kind) {
     return apply({word}, [&](auto v) -> llvm::Value* {
         if (kind->isFloatTy()) return builder.CreateBitCast(v[0], like(v[0], kind));
+        if (kind->isDoubleTy())
+            return builder.CreateFPExt(builder.CreateBitCast(v[0], like(v[0], builder.getFloatTy())), like(v[0], kind));
         if (kind->isHalfTy())
             return math.convert_float(builder.CreateBitCast(v[0], like(v[0], builder.getFloatTy())), kind);
         return builder.CreateZExtOrTrunc(v[0], like(v[0], kind));
@@ -67,6 +69,9 @@ Component Emitter::to_word(const Component& value) {
     return apply({value}, [&](auto v) -> llvm::Value* {
         llvm::Type* scalar = v[0]->getType()->getScalarType();
         if (scalar->isFloatTy()) return builder.CreateBitCast(v[0], like(v[0], builder.getInt32Ty()));
+        if (scalar->isDoubleTy())
+            return builder.CreateBitCast(builder.CreateFPTrunc(v[0], like(v[0], builder.getFloatTy())),
+                                         like(v[0], builder.getInt32Ty()));
         if (scalar->isHalfTy())
             return builder.CreateBitCast(math.convert_float(v[0], builder.getFloatTy()), like(v[0], builder.getInt32Ty()));
         return builder.CreateZExtOrTrunc(v[0], like(v[0], builder.getInt32Ty()));
@@ -305,8 +310,16 @@ bool Emitter::emit_image(const Instruction& at) {
     const Type& type = module.type(image.image_type);
     if (type.dim == spv::Dim::Buffer || type.dim == spv::Dim::SubpassData)
         reject("texel buffers and subpass inputs are not supported");
-    const std::uint32_t dimensions = dimensions_of(type.dim);
     std::vector<Component> coordinates = get(at.operand(1)).components;
+    if (operation == ImageOperation::store && trace_table) {
+        trace(at, 0, {at.operand(2)}, get(at.operand(2)).components);
+        trace_image_write(coordinates);
+    }
+    if (in_double() && image_integer_flag(image.image_type) == 0) {
+        emit_double_image(at, {operation, is_projected, is_compared, is_implicit, first_operand});
+        return true;
+    }
+    const std::uint32_t dimensions = dimensions_of(type.dim);
     const ImageOperands more = operands_from(at, first_operand);
     std::uint32_t flags = static_cast<std::uint32_t>(operation) | image_integer_flag(image.image_type);
     // Only fragment shaders have neighbors to take differences from; elsewhere the base level is read.
@@ -394,6 +407,122 @@ bool Emitter::emit_image(const Instruction& at) {
         may_be_words ? fetch_words(image.image, image.image_type, coordinates, level, call) : call();
     if (at.result) set(at, make_texel(words, at.type));
     return true;
+}
+
+void Emitter::emit_double_image(const Instruction& at, const ImageAccess& access) {
+    const Value image = get(at.operand(0));
+    const Type& type = module.type(image.image_type);
+    const ImageOperands more = operands_from(at, access.first_operand);
+    const ImageOperation operation = access.operation;
+    llvm::Type* real = builder.getDoubleTy();
+    llvm::AllocaInst* memory =
+        make_slot(llvm::ArrayType::get(builder.getInt8Ty(), sizeof(DoubleImageArguments)), "image");
+    constexpr std::size_t real_row = max_lanes * 8, word_row = max_lanes * 4;
+    const auto put = [&](std::size_t offset, const Component& value, llvm::Type* kind) {
+        llvm::Value* row = widen(value);
+        if (kind->isDoubleTy() && row->getType()->isIntOrIntVectorTy())
+            row = builder.CreateSIToFP(row, vector_of(kind));
+        if (kind->isIntegerTy()) row = builder.CreateSExtOrTrunc(row, vector_of(kind));
+        builder.CreateAlignedStore(row, at_offset(memory, static_cast<std::int64_t>(offset)), llvm::Align(4));
+    };
+    const auto put_rows = [&](std::size_t offset, Id id, std::size_t most, llvm::Type* kind) {
+        const Value value = get(id);
+        for (std::size_t i = 0; i < value.components.size() && i < most; ++i)
+            put(offset + i * (kind->isDoubleTy() ? real_row : word_row), value.components[i], kind);
+    };
+    const std::uint32_t dimensions = dimensions_of(type.dim);
+    std::uint32_t flags = static_cast<std::uint32_t>(operation);
+    const Value coordinates = get(at.operand(1));
+    for (std::size_t i = 0; i < coordinates.components.size() && i < 4; ++i) {
+        Component coordinate = coordinates.components[i];
+        if (access.is_projected && i < dimensions)
+            coordinate = apply({coordinate, coordinates.components.at(dimensions)},
+                               [&](auto v) { return builder.CreateFDiv(v[0], v[1]); });
+        put(offsetof(DoubleImageArguments, coordinates) + i * real_row, coordinate, real);
+    }
+    if (operation == ImageOperation::sample || operation == ImageOperation::query_lod) {
+        // Only fragment shaders have neighbors to take differences from; elsewhere the base level is read.
+        const bool has_quads = module.model == spv::ExecutionModel::Fragment;
+        if (more.gradient_x) {
+            flags |= image_lod_gradient;
+            put_rows(offsetof(DoubleImageArguments, gradient_x), more.gradient_x, 3, real);
+            put_rows(offsetof(DoubleImageArguments, gradient_y), more.gradient_y, 3, real);
+        } else {
+            flags |= more.lod || (access.is_implicit && !has_quads) ? image_lod_explicit : image_lod_implicit;
+            const Id lod = more.lod ? more.lod : more.bias;
+            put(offsetof(DoubleImageArguments, lod), lod ? get_scalar(lod) : Component(llvm::ConstantFP::get(real, 0)),
+                real);
+        }
+        if (more.min_lod) {
+            flags |= image_min_lod;
+            put(offsetof(DoubleImageArguments, min_lod), get_scalar(more.min_lod), real);
+        }
+    }
+    if (operation == ImageOperation::fetch || operation == ImageOperation::load)
+        put(offsetof(DoubleImageArguments, lod), more.lod ? get_scalar(more.lod) : Component(int32(0)), real);
+    if (access.is_compared) {
+        flags |= image_compare;
+        put(offsetof(DoubleImageArguments, reference), get_scalar(at.operand(2)), real);
+    } else if (operation == ImageOperation::gather) {
+        flags |= (module.constant_word(at.operand(2)).value_or(0) & 3) << image_component_shift;
+    }
+    if (more.offset) {
+        flags |= image_offset;
+        put_rows(offsetof(DoubleImageArguments, offset), more.offset, 3, builder.getInt32Ty());
+    }
+    if (more.offsets) {
+        flags |= image_offsets;
+        const Value offsets = get(more.offsets);
+        for (std::size_t i = 0; i < 8 && i < offsets.components.size(); ++i)
+            builder.CreateStore(
+                offsets.components[i].value,
+                at_offset(memory, static_cast<std::int64_t>(offsetof(DoubleImageArguments, gather_offsets) + i * 4)));
+    }
+    if (more.sample || type.multisampled)
+        put(offsetof(DoubleImageArguments, sample), more.sample ? get_scalar(more.sample) : Component(int32(0)),
+            builder.getInt32Ty());
+    const bool is_store = operation == ImageOperation::store;
+    if (is_store) {
+        has_side_effects = true;
+        put_rows(offsetof(DoubleImageArguments, texel), at.operand(2), 4, real);
+    }
+
+    llvm::FunctionCallee function =
+        external("nacre_cpu_double_image", builder.getVoidTy(),
+                 {pointer_type, pointer_type, pointer_type, builder.getInt32Ty(), builder.getInt32Ty()});
+    const bool has_sampler = operation == ImageOperation::sample || operation == ImageOperation::gather ||
+                             operation == ImageOperation::query_lod;
+    const Component sampler = has_sampler ? image.sampler : image.image;
+    std::vector<llvm::AllocaInst*> slots_of;
+    for (std::size_t i = 0; i < 4 && !is_store; ++i) {
+        slots_of.push_back(make_slot(vector_of(real), "texel"));
+        builder.CreateStore(llvm::Constant::getNullValue(vector_of(real)), slots_of.back());
+    }
+    for_each_different(
+        image.image, is_store ? effect_mask() : mask, [&](llvm::Value* one_image, llvm::Value* image_mask) {
+            for_each_different(sampler, image_mask, [&](llvm::Value* one_sampler, llvm::Value* lanes_on) {
+                llvm::Value* view = invariant_load(pointer_type, at_offset(one_image, offsetof(Descriptor, image)), 8);
+                llvm::Value* state =
+                    has_sampler ? invariant_load(pointer_type, at_offset(one_sampler, offsetof(Descriptor, sampler)), 8)
+                                : llvm::ConstantPointerNull::get(pointer_type);
+                builder.CreateCall(function,
+                                   {view, state, memory, int32(static_cast<std::int32_t>(flags)), mask_bits(lanes_on)});
+                for (std::size_t i = 0; i < slots_of.size(); ++i) {
+                    llvm::Value* row = builder.CreateAlignedLoad(
+                        vector_of(real),
+                        at_offset(memory,
+                                  static_cast<std::int64_t>(offsetof(DoubleImageArguments, result) + i * real_row)),
+                        llvm::Align(64));
+                    builder.CreateStore(select(lanes_on, row, builder.CreateLoad(vector_of(real), slots_of[i])),
+                                        slots_of[i]);
+                }
+            });
+        });
+    if (!at.result) return;
+    std::vector<Component> values;
+    for (std::uint32_t i = 0; i < module.type(at.type).components; ++i)
+        values.emplace_back(builder.CreateLoad(vector_of(real), slots_of.at(i)));
+    set(at, std::move(values));
 }
 
 bool Emitter::emit_image_query(const Instruction& at) {

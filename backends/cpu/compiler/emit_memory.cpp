@@ -33,7 +33,7 @@ LaneVariable& Emitter::make_lane_variable(Id variable_id, Id type_id, bool is_un
             hold_constant(*made, content);
             return *made;
         }
-        made->slot_bytes = type.has_wide ? 8 : 4;
+        made->slot_bytes = type.has_wide || in_double() ? 8 : 4;
         const std::uint64_t bytes = std::uint64_t{type.components} * made->slot_bytes * (is_uniform ? 1 : lanes);
         if (bytes > (1u << 24))
             reject(fmt::format("a variable of {} scalars takes {} bytes for {} lanes; 16 MiB is the most", type.components, bytes, lanes));
@@ -50,7 +50,7 @@ LaneVariable& Emitter::make_lane_variable(Id variable_id, Id type_id, bool is_un
 void Emitter::hold_constant(LaneVariable& variable, Id content) {
     const Value value = constant(content);
     variable.is_uniform = true;
-    variable.slot_bytes = module.type(variable.type).has_wide ? 8 : 4;
+    variable.slot_bytes = module.type(variable.type).has_wide || in_double() ? 8 : 4;
     std::vector<std::uint32_t> words;
     words.reserve(value.components.size() * variable.slot_bytes / 4);
     for (const Component& component : value.components) {
@@ -109,6 +109,9 @@ Pointer Emitter::pointer_to(Id id) {
             const auto found = workgroup_offsets.find(id);
             if (found == workgroup_offsets.end()) reject("a workgroup variable was not declared");
             pointer.base = workgroup_memory();
+            if (in_double()) {
+                pointer.shadow = at_offset(pointer.base.value, workgroup_shadow_offset);
+            }
             pointer.offset = static_cast<std::int64_t>(found->second);
             return pointer;
         }
@@ -170,6 +173,8 @@ Pointer Emitter::buffer_pointer(const Pointer& block) {
     const Component address = descriptor(block);
     if (address.is_uniform()) {
         pointer.base = invariant_load(pointer_type, at_offset(address.value, offsetof(Descriptor, data)), 8);
+        if (in_double())
+            pointer.shadow = invariant_load(pointer_type, at_offset(address.value, offsetof(Descriptor, shadow)), 8);
         pointer.limit = invariant_load(builder.getInt64Ty(), at_offset(address.value, offsetof(Descriptor, size)), 8);
     } else {
         // A different buffer in each lane.
@@ -178,6 +183,9 @@ Pointer Emitter::buffer_pointer(const Pointer& block) {
             return builder.CreateMaskedGather(vector_of(kind), places, llvm::Align(8), all_lanes(), llvm::Constant::getNullValue(vector_of(kind)));
         };
         pointer.base = builder.CreateIntToPtr(gather(offsetof(Descriptor, data), builder.getInt64Ty()), vector_of(pointer_type));
+        if (in_double())
+            pointer.shadow = builder.CreateIntToPtr(gather(offsetof(Descriptor, shadow), builder.getInt64Ty()),
+                                                    vector_of(pointer_type));
         pointer.limit = gather(offsetof(Descriptor, size), builder.getInt64Ty());
     }
     pointer.needs_limit_check = true;
@@ -360,6 +368,7 @@ llvm::Value* Emitter::addresses(const Pointer& pointer, std::int64_t extra) {
 }
 
 Component Emitter::load_bytes(const Pointer& pointer, std::int64_t extra, const Type& scalar) {
+    if (in_double() && scalar.kind == TypeKind::floating && scalar.bits < 64) return load_float(pointer, extra, scalar);
     const bool is_boolean = scalar.kind == TypeKind::boolean;
     llvm::Type* kind = is_boolean ? builder.getInt32Ty() : scalar_type(scalar);
     const std::uint32_t bytes = is_boolean ? 4 : scalar.bits / 8;
@@ -392,6 +401,8 @@ Component Emitter::load_bytes(const Pointer& pointer, std::int64_t extra, const 
 }
 
 void Emitter::store_bytes(const Pointer& pointer, std::int64_t extra, const Type& scalar, const Component& value) {
+    if (in_double() && scalar.kind == TypeKind::floating && scalar.bits < 64)
+        return store_float(pointer, extra, scalar, value);
     if (pointer.storage != StorageClass::Workgroup) has_side_effects = true;
     const bool is_boolean = scalar.kind == TypeKind::boolean;
     const std::uint32_t bytes = is_boolean ? 4 : scalar.bits / 8;
@@ -427,6 +438,15 @@ void Emitter::store_bytes(const Pointer& pointer, std::int64_t extra, const Type
     builder.CreateMaskedScatter(values, address, alignment, lanes_on);
 }
 
+/// Where each lane's own scalar of a slot lies: the lanes of a slot lie without gaps, however wide the slot is.
+llvm::Value* Emitter::lane_offsets(const LaneVariable& variable, llvm::Value* numbers, llvm::Type* kind) {
+    if (variable.is_uniform) return builder.CreateMul(numbers, splat(int32(variable.slot_bytes)));
+    llvm::Value* slots_before =
+        builder.CreateMul(numbers, splat(int32(static_cast<std::int64_t>(variable.slot_bytes) * lanes)));
+    return builder.CreateAdd(slots_before,
+                             builder.CreateMul(lane_numbers(), splat(int32(kind->getScalarSizeInBits() / 8))));
+}
+
 Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t index, const Type& scalar) {
     LaneVariable& variable = *pointer.variable;
     const std::uint32_t number = pointer.component + index;
@@ -454,7 +474,7 @@ Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t ind
         // Inputs that are indexed dynamically get memory, once, where all of the function can see it.
         LaneVariable spilled;
         const Type& type = module.type(variable.type);
-        spilled.slot_bytes = type.has_wide ? 8 : 4;
+        spilled.slot_bytes = type.has_wide || in_double() ? 8 : 4;
         spilled.memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * spilled.slot_bytes * lanes), "input");
         fill(spilled, variable.components);
         Pointer through = pointer;
@@ -475,12 +495,11 @@ Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t ind
         return finish(value);
     }
     llvm::Value* numbers = builder.CreateAdd(widen(element), splat(int32(number)));
-    llvm::Value* offsets = variable.is_uniform ? builder.CreateMul(numbers, splat(int32(variable.slot_bytes)))
-                                               : builder.CreateMul(builder.CreateAdd(builder.CreateMul(numbers, splat(int32(lanes))), lane_numbers()),
-                                                                   splat(int32(variable.slot_bytes)));
-    llvm::Value* places = builder.CreateGEP(builder.getInt8Ty(), variable.memory, offsets);
+    llvm::Value* places =
+        builder.CreateGEP(builder.getInt8Ty(), variable.memory, lane_offsets(variable, numbers, kind));
     llvm::Value* lanes_on = both(mask, pointer.valid ? pointer.valid.value : nullptr);
-    return finish(builder.CreateMaskedGather(vector_of(kind), places, llvm::Align(variable.slot_bytes), lanes_on,
+    return finish(builder.CreateMaskedGather(vector_of(kind), places,
+                                             llvm::Align(std::min(4u, kind->getScalarSizeInBits() / 8)), lanes_on,
                                              llvm::Constant::getNullValue(vector_of(kind))));
 }
 
@@ -522,10 +541,10 @@ void Emitter::store_lane_component(const Pointer& pointer, std::uint32_t index, 
     }
     if (variable.is_uniform) reject("a variable held to be uniform is written at different places");
     llvm::Value* numbers = builder.CreateAdd(widen(element), splat(int32(number)));
-    llvm::Value* offsets = builder.CreateMul(builder.CreateAdd(builder.CreateMul(numbers, splat(int32(lanes))), lane_numbers()),
-                                             splat(int32(variable.slot_bytes)));
-    llvm::Value* places = builder.CreateGEP(builder.getInt8Ty(), variable.memory, offsets);
-    builder.CreateMaskedScatter(widen(stored), places, llvm::Align(variable.slot_bytes), both(mask, pointer.valid ? pointer.valid.value : nullptr));
+    llvm::Value* places =
+        builder.CreateGEP(builder.getInt8Ty(), variable.memory, lane_offsets(variable, numbers, kind));
+    builder.CreateMaskedScatter(widen(stored), places, llvm::Align(std::min(4u, kind->getScalarSizeInBits() / 8)),
+                                both(mask, pointer.valid ? pointer.valid.value : nullptr));
 }
 
 void Emitter::visit_layout(const Pointer& pointer, Id type_id, std::int64_t extra,
@@ -577,8 +596,11 @@ std::vector<Component> Emitter::load(const Pointer& pointer) {
         std::uint32_t index = 0;
         for_each_component_type(pointer.type, [&](const Type& scalar) { values.push_back(load_lane_component(pointer, index++, scalar)); });
     } else if (pointer.kind == Pointer::Kind::bytes) {
-        if (auto rows = load_rows(pointer)) return std::move(*rows);
-        if (auto equal = load_where_equal(pointer)) return std::move(*equal);
+        // With doubles each word has a shadow, and speed does not matter.
+        if (!in_double()) {
+            if (auto rows = load_rows(pointer)) return std::move(*rows);
+            if (auto equal = load_where_equal(pointer)) return std::move(*equal);
+        }
         visit_layout(pointer, pointer.type, 0, [&](const Pointer& at, std::int64_t extra, const Type& scalar) {
             values.push_back(load_bytes(at, extra, scalar));
         });
@@ -596,7 +618,7 @@ void Emitter::store(const Pointer& pointer, const std::vector<Component>& values
             ++index;
         });
     } else if (pointer.kind == Pointer::Kind::bytes) {
-        if (store_rows(pointer, values)) return;
+        if (!in_double() && store_rows(pointer, values)) return;
         visit_layout(pointer, pointer.type, 0, [&](const Pointer& at, std::int64_t extra, const Type& scalar) {
             store_bytes(at, extra, scalar, values.at(index++));
         });
@@ -625,6 +647,10 @@ void Emitter::declare_variables() {
             workgroup_offsets[id] = workgroup_variable_bytes;
             workgroup_variable_bytes += (module.tight_size(variable.type) + 15) / 16 * 16;
         }
+    if (in_double()) {
+        workgroup_shadow_offset = static_cast<std::int64_t>(workgroup_variable_bytes);
+        workgroup_variable_bytes *= 3;
+    }
     // Inputs are made here, where everything that follows can see them.
     for (const Id id : module.interface())
         if (const Variable* variable = module.variable(id); variable && variable->storage == StorageClass::Input) pointer_to(id);
@@ -720,10 +746,13 @@ bool Emitter::emit_memory(const Instruction& at) {
                 })});
             return true;
         }
-        case Op::OpStore:
+        case Op::OpStore: {
             if (module.constant_content(at.operand(0))) return true;
-            store(get_pointer(at.operand(0)), get_components(at.operand(1)));
+            const std::vector<Component> values = get_components(at.operand(1));
+            if (trace_table) trace(at, trace_root(at.operand(0)), {at.operand(1)}, values);
+            store(get_pointer(at.operand(0)), values);
             return true;
+        }
         case Op::OpCopyMemory: store(get_pointer(at.operand(0)), load(get_pointer(at.operand(1)))); return true;
         case Op::OpArrayLength: {
             // Of the last member of the block that the pointer leads to.

@@ -111,6 +111,8 @@ std::vector<Component> Emitter::read_query(Id pointer, std::span<const std::size
     });
     std::vector<Component> values;
     for (llvm::AllocaInst* slot : slots_of) values.emplace_back(builder.CreateLoad(vector_of(scalar), slot));
+    if (scalar->isFloatTy())
+        for (Component& value : values) value = from_single(value);
     return values;
 }
 
@@ -133,6 +135,8 @@ std::vector<Component> Emitter::ray_property(Id pointer, std::uint32_t property,
     });
     std::vector<Component> values;
     for (llvm::AllocaInst* slot : slots_of) values.emplace_back(builder.CreateLoad(vector_of(scalar), slot));
+    if (scalar->isFloatTy())
+        for (Component& value : values) value = from_single(value);
     return values;
 }
 
@@ -304,8 +308,11 @@ bool Emitter::emit_ray(const Instruction& at) {
                     builder.CreateMaskedGather(wide, places, llvm::Align(8), mask, llvm::Constant::getNullValue(wide)), vector_of(pointer_type));
             }
             const Component flags = get_scalar(at.operand(2)), cull_mask = get_scalar(at.operand(3));
-            const Value origin = get(at.operand(4)), direction = get(at.operand(6));
-            const Component t_min = get_scalar(at.operand(5)), t_max = get_scalar(at.operand(7));
+            note_narrowed("ray");
+            Value origin = get(at.operand(4)), direction = get(at.operand(6));
+            for (Component& coordinate : origin.components) coordinate = to_single(coordinate);
+            for (Component& coordinate : direction.components) coordinate = to_single(coordinate);
+            const Component t_min = to_single(get_scalar(at.operand(5))), t_max = to_single(get_scalar(at.operand(7)));
             llvm::Value* zero_row = llvm::Constant::getNullValue(vector_of(word));
             llvm::Value* none_row = llvm::Constant::getAllOnesValue(vector_of(word));
             for_each_query(at.operand(0), [&](llvm::Value* query, llvm::Value* lanes_on) {

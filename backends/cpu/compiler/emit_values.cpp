@@ -28,9 +28,17 @@ Value Emitter::constant(Id id) {
             if (type.bits == 64) bits |= std::uint64_t{at.operand(1)} << 32;
             llvm::Type* integer = builder.getIntNTy(type.bits);
             llvm::Constant* word = llvm::ConstantInt::get(integer, type.bits < 64 ? bits & ((1ull << type.bits) - 1) : bits);
-            value.components = {type.kind == TypeKind::floating
-                                    ? llvm::ConstantExpr::getBitCast(word, scalar_type(type))
-                                    : word};
+            value.components = {word};
+            if (type.kind == TypeKind::floating) {
+                llvm::APFloat number(type.bits == 16   ? llvm::APFloat::IEEEhalf()
+                                     : type.bits == 32 ? llvm::APFloat::IEEEsingle()
+                                                       : llvm::APFloat::IEEEdouble(),
+                                     word->getUniqueInteger());
+                bool is_inexact = false;
+                if (in_double())
+                    number.convert(llvm::APFloat::IEEEdouble(), llvm::APFloat::rmNearestTiesToEven, &is_inexact);
+                value.components = {llvm::ConstantFP::get(context, number)};
+            }
             break;
         }
         case Op::OpConstantComposite:
@@ -120,6 +128,7 @@ void Emitter::set(const Instruction& at, std::vector<Component> components) {
     if (!uniformity.is_divergent(at.result))
         for (Component& component : components)
             if (!component.is_uniform()) component = Component(narrow(component, mask));
+    trace_result(at, components);
     define(at.result).components = std::move(components);
     finish_definition(at.result);
 }

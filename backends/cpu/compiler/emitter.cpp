@@ -19,7 +19,8 @@ llvm::Type* Emitter::scalar_type(const Type& type) {
         case TypeKind::boolean: return builder.getInt1Ty();
         case TypeKind::integer: return builder.getIntNTy(type.bits);
         case TypeKind::floating:
-            return type.bits == 16 ? builder.getHalfTy() : type.bits == 64 ? builder.getDoubleTy() : builder.getFloatTy();
+            if (type.bits == 64 || in_double()) return builder.getDoubleTy();
+            return type.bits == 16 ? builder.getHalfTy() : builder.getFloatTy();
         default: reject("a type without a value is used as one");
     }
 }

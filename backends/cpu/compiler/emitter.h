@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <llvm/IR/IRBuilder.h>
+#include <llvm/IR/Module.h>
+
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,13 +13,11 @@
 #include <unordered_set>
 #include <vector>
 
-#include <llvm/IR/IRBuilder.h>
-#include <llvm/IR/Module.h>
-
 #include "backends/cpu/compiler/compiler.h"
 #include "backends/cpu/compiler/math/math.h"
 #include "backends/cpu/compiler/module.h"
 #include "backends/cpu/compiler/uniformity.h"
+#include "backends/cpu/trace.h"
 
 /// @file
 /// From SPIR-V to LLVM IR that runs `lanes` invocations at once.
@@ -70,6 +72,7 @@ struct Pointer {
 
     // Kind::bytes
     Component base;                  ///< ptr
+    Component shadow;                ///< ptr to the doubles of the words at base; null: none. See in_double().
     Component limit;                 ///< i64, bytes behind base; null: never exceeded.
     std::int64_t offset = 0;         ///< Constant part, bytes.
     Component dynamic_offset;        ///< i32 bytes; null: 0.
@@ -125,12 +128,44 @@ class Emitter {
   public:
     Emitter(llvm::Module& target, const Module& module, const CompilerOptions& options, std::span<const BindingSlots> slots);
     virtual ~Emitter() = default;
+    /// Set before the emission of a program that tells what it computes, and filled by it.
+    TraceTable* trace_table = nullptr;
+    /// Instructions that went through single precision on a device in double precision: offset in the module and what
+    /// they do.
+    [[nodiscard]] const std::map<std::uint32_t, std::string>& narrowed() const { return narrowed_; }
     Emitter(const Emitter&) = delete;
     Emitter& operator=(const Emitter&) = delete;
 
   protected:
     // ---- Types and small parts (emitter.cpp)
     [[nodiscard]] llvm::Type* scalar_type(const Type& type);
+    // Double precision (emit_double.cpp).
+    /// Whether all floats are doubles in registers, whatever the width of their type. Types keep that width: it counts
+    /// in memory, for bits, and wherever a value has to go through single precision.
+    [[nodiscard]] bool in_double() const { return options.mode == ExecutionMode::double_precision; }
+    /// What a float of 32 bits is in registers.
+    [[nodiscard]] llvm::Type* real_type() { return in_double() ? builder.getDoubleTy() : builder.getFloatTy(); }
+    /// Floats as single precision whatever they are in registers, and back.
+    Component to_single(const Component& value);
+    Component from_single(const Component& value);
+    /// The bits of a scalar as an integer as wide as its type, and back. Floats are rounded to their type.
+    Component bits_of(const Component& value, const Type& scalar);
+    Component of_bits(const Component& bits, const Type& scalar);
+    /// Lists the current instruction among those that go through single precision.
+    void note_narrowed(const char* operation);
+    // Traces (emit_trace.cpp); nothing without a trace_table.
+    /// The invocation begins; `is_traced` has the lane of the traced one. `ids`: of each lane, for compute shaders.
+    void begin_trace(llvm::Value* is_traced, std::vector<Component> ids);
+    void trace(const Instruction& at, Id result, std::vector<Id> operands, const std::vector<Component>& values);
+    void trace_result(const Instruction& at, const std::vector<Component>& values);
+    void trace_image_write(const std::vector<Component>& coordinates);
+    /// The variable behind a chain of accesses; the pointer itself where there is none.
+    [[nodiscard]] Id trace_root(Id pointer) const;
+    [[nodiscard]] bool has_shadow(const Pointer& pointer, const Type& scalar) const;
+    /// The doubles of the words that a pointer leads to.
+    Pointer shadow_of(const Pointer& pointer);
+    Component load_float(const Pointer& pointer, std::int64_t extra, const Type& scalar);
+    void store_float(const Pointer& pointer, std::int64_t extra, const Type& scalar, const Component& value);
     [[nodiscard]] llvm::Type* vector_of(llvm::Type* scalar) { return llvm::FixedVectorType::get(scalar, lanes); }
     /// `scalar`, or a vector of it where `shape` is a vector.
     llvm::Type* like(llvm::Value* shape, llvm::Type* scalar);
@@ -206,6 +241,14 @@ class Emitter {
     std::vector<Component> image_call(const Component& image, const Component& sampler, Id image_type,
                                       const std::vector<Component>& coordinates, std::uint32_t flags,
                                       const std::vector<Component>& texel, const Component& sample);
+    /// How an instruction reads or writes an image.
+    struct ImageAccess {
+        ImageOperation operation = ImageOperation::sample;
+        bool is_projected = false, is_compared = false, is_implicit = false;
+        std::size_t first_operand = 2;  ///< Of the image operands.
+    };
+    /// The instruction on doubles, for images of floats.
+    void emit_double_image(const Instruction& at, const ImageAccess& access);
     llvm::Value* bound_view(llvm::Value* descriptor_address);           ///< ptr to ImageView; to zeros where nothing is bound.
     std::vector<Component> fetch_words(const Component& image, Id image_type, const std::vector<Component>& coordinates,
                                        const Component& level, const std::function<std::vector<Component>()>& otherwise);
@@ -253,6 +296,7 @@ class Emitter {
     llvm::Value* addresses(const Pointer& pointer, std::int64_t extra);  ///< ptr or <N x ptr>
     Component load_lane_component(const Pointer& pointer, std::uint32_t index, const Type& scalar);
     void store_lane_component(const Pointer& pointer, std::uint32_t index, const Type& scalar, const Component& value);
+    llvm::Value* lane_offsets(const LaneVariable& variable, llvm::Value* numbers, llvm::Type* kind);
     Component descriptor(const Pointer& pointer);        ///< ptr to Descriptor
     Pointer buffer_pointer(const Pointer& block);        ///< Kind::bytes from a descriptor of a buffer.
     void visit_layout(const Pointer& pointer, Id type, std::int64_t extra,
@@ -331,6 +375,9 @@ class Emitter {
     std::uint64_t workgroup_variable_bytes = 0;
     std::uint64_t stack_bytes = 0;             ///< Of variables, all together.
     bool has_side_effects = false;             ///< Some store, atomic or image store was emitted.
+    llvm::AllocaInst* trace_lane = nullptr;
+    std::vector<Component> invocation_ids;     ///< Compute shaders that are traced.
+    std::int64_t workgroup_shadow_offset = 0;  ///< Of the doubles of workgroup variables, in their memory.
 
     /// What is known of a function before it is emitted.
     struct Shape {
@@ -421,6 +468,7 @@ class Emitter {
     llvm::Function* kept_function(const Function& callee);
     std::unordered_map<Id, Value> constants_;
     std::unordered_map<std::string, llvm::Value*> shared_;
+    std::map<std::uint32_t, std::string> narrowed_;
 };
 
 }  // namespace nacre::cpu

@@ -27,6 +27,13 @@ Component FragmentEmitter::primitive_word(std::size_t offset, llvm::Type* type) 
     const std::size_t aligned = offset / 16 * 16;
     const int part = static_cast<int>(offset % 16 / 4);
     auto* four = llvm::FixedVectorType::get(builder.getFloatTy(), 4);
+    llvm::SmallVector<int, 16> spread(lanes);
+    for (std::uint32_t i = 0; i < lanes; ++i) spread[i] = static_cast<int>(i / 4 * 4) + part;
+    const auto finished = [&](llvm::Value* joined) {
+        llvm::Value* value = builder.CreateShuffleVector(joined, spread);
+        return Component(type->isFloatTy() ? value : builder.CreateBitCast(value, vector_of(type)));
+    };
+    if (const auto found = joined_words_.find(aligned); found != joined_words_.end()) return finished(found->second);
     std::vector<llvm::Value*> parts;
     for (std::uint32_t q = 0; q < quads; ++q)
         parts.push_back(invariant_load(four, at_offset(primitives[q], static_cast<std::int64_t>(aligned)), 16));
@@ -41,13 +48,32 @@ Component FragmentEmitter::primitive_word(std::size_t offset, llvm::Type* type) 
         }
         parts = std::move(joined);
     }
-    llvm::SmallVector<int, 16> spread(lanes);
-    for (std::uint32_t i = 0; i < lanes; ++i) spread[i] = static_cast<int>(i / 4 * 4) + part;
-    llvm::Value* value = builder.CreateShuffleVector(parts[0], spread);
-    return Component(type->isFloatTy() ? value : builder.CreateBitCast(value, vector_of(type)));
+    if (keeps_joined_words) joined_words_.emplace(aligned, parts[0]);
+    return finished(parts[0]);
+}
+
+Component FragmentEmitter::primitive_double(std::size_t offset) {
+    llvm::Value* all = llvm::PoisonValue::get(vector_of(builder.getDoubleTy()));
+    const auto at = static_cast<std::int64_t>(double_primitive_offset(program.inputs.size()) + offset);
+    for (std::uint32_t lane = 0; lane < lanes; ++lane) {
+        llvm::Value* value = invariant_load(builder.getDoubleTy(), at_offset(primitives[lane / 4], at), 8);
+        all = builder.CreateInsertElement(all, value, std::uint64_t{lane});
+    }
+    return Component(all);
 }
 
 Component FragmentEmitter::evaluate_plane(std::size_t offset, const Place& place) {
+    if (in_double()) {
+        // Planes of doubles lie in the same order.
+        const std::size_t plane = offsetof(DoublePrimitive, planes) +
+                                  (offset - offsetof(PrimitiveData, depth)) / sizeof(Plane) * sizeof(DoublePlane);
+        llvm::Value* from_x = builder.CreateFSub(place.x, primitive_double(offsetof(DoublePrimitive, x0)).value);
+        llvm::Value* from_y = builder.CreateFSub(place.y, primitive_double(offsetof(DoublePrimitive, y0)).value);
+        llvm::Value* along_x = builder.CreateFMul(primitive_double(plane + offsetof(DoublePlane, dx)).value, from_x);
+        llvm::Value* along_y = builder.CreateFMul(primitive_double(plane + offsetof(DoublePlane, dy)).value, from_y);
+        llvm::Value* start = primitive_double(plane + offsetof(DoublePlane, c)).value;
+        return Component(builder.CreateFAdd(builder.CreateFAdd(start, along_x), along_y));
+    }
     llvm::Value* c = primitive_word(offset + offsetof(Plane, c), builder.getFloatTy()).value;
     llvm::Value* dx = primitive_word(offset + offsetof(Plane, dx), builder.getFloatTy()).value;
     llvm::Value* dy = primitive_word(offset + offsetof(Plane, dy), builder.getFloatTy()).value;
@@ -67,6 +93,8 @@ Component FragmentEmitter::evaluate_plane(std::size_t offset, const Place& place
 Component FragmentEmitter::evaluate_input(std::uint32_t index, const Place& place, const Type& scalar) {
     const std::size_t offset = sizeof(PrimitiveData) + index * sizeof(Plane);
     const FragmentInput& input = program.inputs[index];
+    if (input.interpolation == Interpolation::flat && in_double() && scalar.kind == TypeKind::floating)
+        return primitive_double(sizeof(DoublePrimitive) + index * sizeof(DoublePlane) + offsetof(DoublePlane, c));
     if (input.interpolation == Interpolation::flat) return from_word(primitive_word(offset, builder.getInt32Ty()), scalar_type(scalar));
     Component value = evaluate_plane(offset, place);
     if (input.interpolation == Interpolation::perspective) {
@@ -74,7 +102,7 @@ Component FragmentEmitter::evaluate_input(std::uint32_t index, const Place& plac
         llvm::Value* one = llvm::ConstantFP::get(inverse->getType(), 1);
         value = Component(builder.CreateFMul(value.value, builder.CreateFDiv(one, inverse)));
     }
-    return scalar.bits == 32 ? value : Component(math.convert_float(value.value, scalar_type(scalar)));
+    return scalar.bits == 32 || in_double() ? value : Component(math.convert_float(value.value, scalar_type(scalar)));
 }
 
 std::vector<llvm::Value*> FragmentEmitter::evaluate_inputs() {
@@ -98,8 +126,10 @@ std::vector<llvm::Value*> FragmentEmitter::for_one_or_several(const std::functio
     const auto fill = [&](llvm::BasicBlock*& block, bool of_one) {
         builder.SetInsertPoint(block);
         is_one_primitive = of_one;
+        keeps_joined_words = !of_one;
         std::vector<llvm::Value*> values = evaluate();
-        is_one_primitive = false;
+        is_one_primitive = keeps_joined_words = false;
+        joined_words_.clear();
         block = builder.GetInsertBlock();
         builder.CreateBr(next);
         return values;
@@ -200,6 +230,15 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
             case BuiltIn::ViewportIndex:
             case BuiltIn::DeviceIndex: return {Component(int32(0))};
             case BuiltIn::PointCoord: {
+                if (in_double()) {
+                    const Component scale = primitive_double(offsetof(DoublePrimitive, inverse_point_size));
+                    const auto inside = [&](llvm::Value* place, std::size_t offset) {
+                        llvm::Value* from = primitive_double(offset).value;
+                        return Component(builder.CreateFMul(builder.CreateFSub(place, from), scale.value));
+                    };
+                    return {inside(center.x, offsetof(DoublePrimitive, point_x)),
+                            inside(center.y, offsetof(DoublePrimitive, point_y))};
+                }
                 llvm::Value* scale = primitive_word(offsetof(PrimitiveData, inverse_point_size), builder.getFloatTy()).value;
                 llvm::Value* left = primitive_word(offsetof(PrimitiveData, origin_x), builder.getFloatTy()).value;
                 llvm::Value* top = primitive_word(offsetof(PrimitiveData, origin_y), builder.getFloatTy()).value;
@@ -209,7 +248,8 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
             case BuiltIn::SampleId:
                 return {Component(builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, sample_index)), llvm::Align(4)))};
             case BuiltIn::SamplePosition:
-                return {Component(float_word(offsetof(FragmentBatch, sample_x))), Component(float_word(offsetof(FragmentBatch, sample_y)))};
+                return {from_single(float_word(offsetof(FragmentBatch, sample_x))),
+                        from_single(float_word(offsetof(FragmentBatch, sample_y)))};
             case BuiltIn::SampleMask: {
                 std::vector<Component> made(module.type(variable.type).components, Component(int32(0)));
                 made[0] = Component(builder.CreateAlignedLoad(vector_of(builder.getInt32Ty()), at_offset(batch, offsetof(FragmentBatch, sample_mask_in)), llvm::Align(64)));
@@ -267,15 +307,17 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
             if (number == GLSLstd450InterpolateAtOffset) {
                 const Value offset = get(at.operand(3));
                 const auto shifted = [&](const Component& by) {
-                    return builder.CreateFAdd(widen(by), llvm::ConstantFP::get(vector_of(builder.getFloatTy()), 0.5));
+                    return builder.CreateFAdd(widen(by), llvm::ConstantFP::get(vector_of(real_type()), 0.5));
                 };
                 place = place_at(shifted(offset.components.at(0)), shifted(offset.components.at(1)));
             } else if (number == GLSLstd450InterpolateAtSample) {
                 llvm::Value* which = widen(get_scalar(at.operand(3)));
                 llvm::Value *x = nullptr, *y = nullptr;
                 for (std::size_t i = sample_places.size(); i-- > 0;) {
-                    llvm::Value* here_x = llvm::ConstantFP::get(vector_of(builder.getFloatTy()), static_cast<double>(sample_places[i][0]));
-                    llvm::Value* here_y = llvm::ConstantFP::get(vector_of(builder.getFloatTy()), static_cast<double>(sample_places[i][1]));
+                    llvm::Value* here_x =
+                        llvm::ConstantFP::get(vector_of(real_type()), static_cast<double>(sample_places[i][0]));
+                    llvm::Value* here_y =
+                        llvm::ConstantFP::get(vector_of(real_type()), static_cast<double>(sample_places[i][1]));
                     llvm::Value* is_this = builder.CreateICmpEQ(which, llvm::ConstantInt::get(which->getType(), i));
                     x = x ? select(is_this, here_x, x) : here_x;
                     y = y ? select(is_this, here_y, y) : here_y;
@@ -307,6 +349,13 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
 }
 
 void FragmentEmitter::store_outputs() {
+    llvm::Value* doubles =
+        in_double() ? invariant_load(pointer_type, at_offset(batch, offsetof(FragmentBatch, doubles)), 8) : nullptr;
+    const auto put_double = [&](std::size_t offset, const Component& value) {
+        if (value.value->getType()->getScalarType()->isDoubleTy())
+            builder.CreateAlignedStore(widen(value), at_offset(doubles, static_cast<std::int64_t>(offset)),
+                                       llvm::Align(64));
+    };
     for (const Id id : module.interface()) {
         const Variable* variable = module.variable(id);
         if (!variable || variable->storage != spv::StorageClass::Output) continue;
@@ -315,8 +364,12 @@ void FragmentEmitter::store_outputs() {
             const auto put = [&](std::size_t offset) {
                 builder.CreateAlignedStore(widen(to_word(values.at(0))), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
             };
-            if (*variable->builtin == BuiltIn::FragDepth) program.writes_depth = true, put(offsetof(FragmentBatch, depth));
-            else if (*variable->builtin == BuiltIn::SampleMask) program.writes_sample_mask = true, put(offsetof(FragmentBatch, sample_mask_out));
+            if (*variable->builtin == BuiltIn::FragDepth) {
+                program.writes_depth = true;
+                put(offsetof(FragmentBatch, depth));
+                put_double(offsetof(FragmentDoubles, depth), values.at(0));
+            } else if (*variable->builtin == BuiltIn::SampleMask)
+                program.writes_sample_mask = true, put(offsetof(FragmentBatch, sample_mask_out));
             else reject("a built-in output is not supported in fragment shaders");
             continue;
         }
@@ -329,6 +382,7 @@ void FragmentEmitter::store_outputs() {
             if (output >= max_color_outputs || at.component >= 4) reject("a color output lies behind the last location");
             const std::size_t offset = offsetof(FragmentBatch, colors) + (output * 4 + at.component) * max_lanes * 4;
             builder.CreateAlignedStore(widen(to_word(values[i])), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
+            put_double(offsetof(FragmentDoubles, colors) + (output * 4 + at.component) * max_lanes * 8, values[i]);
             auto found = std::ranges::find(program.outputs, output, &FragmentOutput::output);
             if (found == program.outputs.end()) program.outputs.push_back({output, at.component + 1});
             else found->components = std::max(found->components, at.component + 1);
@@ -366,17 +420,25 @@ void FragmentEmitter::emit_batch() {
     llvm::Value* y = corner(offsetof(FragmentBatch, y));
     std::vector<std::uint32_t> step_x(lanes), step_y(lanes);
     for (std::uint32_t i = 0; i < lanes; ++i) step_x[i] = i & 1, step_y[i] = i >> 1 & 1;
-    pixel_x = builder.CreateSIToFP(builder.CreateAdd(x, llvm::ConstantDataVector::get(context, step_x)), vector_of(builder.getFloatTy()));
-    pixel_y = builder.CreateSIToFP(builder.CreateAdd(y, llvm::ConstantDataVector::get(context, step_y)), vector_of(builder.getFloatTy()));
+    llvm::Value* const corner_x = x;
+    llvm::Value* const corner_y = y;
+    pixel_x = builder.CreateSIToFP(builder.CreateAdd(x, llvm::ConstantDataVector::get(context, step_x)),
+                                   vector_of(real_type()));
+    pixel_y = builder.CreateSIToFP(builder.CreateAdd(y, llvm::ConstantDataVector::get(context, step_y)),
+                                   vector_of(real_type()));
     declare_inputs();
     const auto batch_float = [&](std::size_t offset) {
-        return splat(builder.CreateAlignedLoad(builder.getFloatTy(), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4)));
+        llvm::Value* number = builder.CreateAlignedLoad(
+            builder.getFloatTy(), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4));
+        return splat(from_single(number).value);
     };
     center = place_at(batch_float(offsetof(FragmentBatch, sample_x)), batch_float(offsetof(FragmentBatch, sample_y)));
     centroid = center;
     if (program.uses_centroid) {
         const auto lane_float = [&](std::size_t offset) {
-            return builder.CreateAlignedLoad(vector_of(builder.getFloatTy()), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
+            llvm::Value* numbers = builder.CreateAlignedLoad(
+                vector_of(builder.getFloatTy()), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
+            return from_single(numbers).value;
         };
         centroid = place_at(lane_float(offsetof(FragmentBatch, centroid_x)), lane_float(offsetof(FragmentBatch, centroid_y)));
     }
@@ -385,6 +447,18 @@ void FragmentEmitter::emit_batch() {
     llvm::Value* live_bits = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, live)), llvm::Align(4));
     store_live(builder.CreateBitCast(builder.CreateTrunc(live_bits, builder.getIntNTy(lanes)), mask_type));
     mask = all_lanes();
+    if (trace_table) {
+        llvm::Value* wanted = load_context(offsetof(ShaderContext, trace), pointer_type);
+        const auto is_at = [&](llvm::Value* corner_of, const std::vector<std::uint32_t>& step, std::size_t axis) {
+            llvm::Value* coordinate = invariant_load(
+                builder.getInt32Ty(),
+                at_offset(wanted, static_cast<std::int64_t>(offsetof(ShaderTrace, invocation) + 4 * axis)), 4);
+            return builder.CreateICmpEQ(builder.CreateAdd(corner_of, llvm::ConstantDataVector::get(context, step)),
+                                        splat(coordinate));
+        };
+        begin_trace(
+            builder.CreateAnd(live(), builder.CreateAnd(is_at(corner_x, step_x, 0), is_at(corner_y, step_y, 1))), {});
+    }
     declare_variables();
     emit_function(module.entry(), {}, all_lanes());
     mask = all_lanes();

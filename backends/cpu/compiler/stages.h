@@ -72,6 +72,7 @@ class FragmentEmitter final : public Emitter {
     Component evaluate_plane(std::size_t offset, const Place& place);  ///< Of the plane at a byte offset in PrimitiveData.
     Component evaluate_input(std::uint32_t index, const Place& place, const Type& scalar);
     Component primitive_word(std::size_t offset, llvm::Type* type);
+    Component primitive_double(std::size_t offset);  ///< Of DoublePrimitive.
     std::vector<llvm::Value*> evaluate_inputs();
     /// `evaluate` for batches of one primitive and for others, whichever the batch is.
     std::vector<llvm::Value*> for_one_or_several(const std::function<std::vector<llvm::Value*>()>& evaluate);

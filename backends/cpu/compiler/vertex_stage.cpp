@@ -68,14 +68,14 @@ Component VertexEmitter::fetch(const rhi::VertexAttribute& attribute, std::uint3
         bits = builder.CreateMaskedGather(vector_of(word), addresses_of, llvm::Align(1), fits, llvm::Constant::getNullValue(vector_of(word)));
     }
     const auto constant_word = [&](std::uint32_t value) { return llvm::ConstantInt::get(bits->getType(), value); };
-    const auto float_type = [&]() { return like(bits, builder.getFloatTy()); };
+    const auto float_type = [&]() { return like(bits, real_type()); };
     const auto to_result = [&](llvm::Value* value) -> Component {
         llvm::Type* kind = scalar_type(scalar);
         if (is_integer) {
             llvm::Type* shaped = like(value, kind);
             return Component(builder.CreateZExtOrTrunc(value, shaped));
         }
-        return Component(kind->isFloatTy() ? value : math.convert_float(value, kind));
+        return Component(value->getType()->getScalarType() == kind ? value : math.convert_float(value, kind));
     };
     const bool is_signed = format.kind == FormatKind::sint || format.kind == FormatKind::snorm;
     if (channel.bits < 32) {
@@ -92,7 +92,24 @@ Component VertexEmitter::fetch(const rhi::VertexAttribute& attribute, std::uint3
             return to_result(is_signed ? builder.CreateSIToFP(bits, float_type()) : builder.CreateUIToFP(bits, float_type()));
         case FormatKind::floating:
             if (channel.bits == 16) return to_result(math.half_to_float(bits));
-            return is_integer ? to_result(bits) : to_result(builder.CreateBitCast(bits, float_type()));
+            if (is_integer) return to_result(bits);
+            if (in_double()) {
+                const Component plain = from_word(Component(bits), real_type());
+                if (layout.stride % 4 != 0 || attribute.offset % 4 != 0) return plain;
+                // The word's double, where it stands for the word.
+                const std::size_t shadow_offset = binding + offsetof(VertexBufferBinding, shadow);
+                llvm::Value* shadow =
+                    invariant_load(pointer_type, at_offset(draw, static_cast<std::int64_t>(shadow_offset)), 8);
+                llvm::Value* twice = builder.CreateShl(begin, llvm::ConstantInt::get(begin->getType(), 1));
+                llvm::Value* places = builder.CreateGEP(builder.getInt8Ty(), at_offset(shadow, 2 * extra),
+                                                        is_fixed ? splat(twice) : twice);
+                llvm::Value* none = llvm::Constant::getNullValue(vector_of(real_type()));
+                const Component precise = builder.CreateMaskedGather(vector_of(real_type()), places, llvm::Align(8),
+                                                                     is_fixed ? splat(fits) : fits, none);
+                llvm::Value* stands = builder.CreateICmpEQ(to_word(precise).value, widen(Component(bits)));
+                return Component(select(stands, precise.value, widen(plain)));
+            }
+            return to_result(builder.CreateBitCast(bits, float_type()));
         case FormatKind::unorm:
         case FormatKind::srgb: {
             const double most = channel.bits == 32 ? 4294967295.0 : (1u << channel.bits) - 1;
@@ -138,8 +155,13 @@ std::vector<Component> VertexEmitter::input_components(const Variable& variable)
 
 void VertexEmitter::store_outputs() {
     llvm::Value* outputs = invariant_load(pointer_type, at_offset(batch, offsetof(VertexBatch, outputs)), 8);
+    llvm::Value* doubles =
+        in_double() ? invariant_load(pointer_type, at_offset(batch, offsetof(VertexBatch, doubles)), 8) : nullptr;
     const auto put = [&](std::uint32_t slot, const Component& value) {
         builder.CreateAlignedStore(widen(to_word(value)), at_offset(outputs, std::int64_t{slot} * max_lanes * 4), llvm::Align(64));
+        if (value.value->getType()->getScalarType()->isDoubleTy())
+            builder.CreateAlignedStore(widen(value), at_offset(doubles, std::int64_t{slot} * max_lanes * 8),
+                                       llvm::Align(64));
     };
     bool has_point_size = false;
     // Clip distances come before cull distances, wherever the shader declares them.
@@ -207,8 +229,9 @@ void VertexEmitter::store_outputs() {
         }
     }
     if (!has_position)
-        for (std::uint32_t i = 0; i < 4; ++i) put(slot_position + i, Component(llvm::ConstantFP::get(builder.getFloatTy(), i == 3)));
-    if (!has_point_size) put(slot_point_size, Component(llvm::ConstantFP::get(builder.getFloatTy(), 1)));
+        for (std::uint32_t i = 0; i < 4; ++i)
+            put(slot_position + i, Component(llvm::ConstantFP::get(real_type(), i == 3)));
+    if (!has_point_size) put(slot_point_size, Component(llvm::ConstantFP::get(real_type(), 1)));
     program.writes_point_size = has_point_size;
     std::ranges::sort(program.outputs, {}, [](const VertexOutput& at) { return std::pair(at.location, at.component); });
 }

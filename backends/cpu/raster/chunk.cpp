@@ -81,16 +81,10 @@ class Assembler {
     const std::uint32_t draw_bits_;
 };
 
-/// Vulkan specification, "Depth Bias Computation".
 double Assembler::bias(double slope, double largest_depth) const {
     const rhi::DepthStencilState& state = pipeline_.depth_stencil;
-    if (state.depth_bias == 0.0f && state.depth_bias_slope == 0.0f) return 0.0;
-    double unit = fixed_unit(draw_.depth_layout);
-    if (unit == 0.0 && largest_depth > 0.0) unit = std::ldexp(1.0, std::max(std::ilogb(largest_depth), -126) - 23);
-    double result = slope * state.depth_bias_slope + unit * state.depth_bias;
-    if (state.depth_bias_clamp > 0.0f) result = std::min(result, static_cast<double>(state.depth_bias_clamp));
-    if (state.depth_bias_clamp < 0.0f) result = std::max(result, static_cast<double>(state.depth_bias_clamp));
-    return std::isfinite(result) ? result : 0.0;
+    return depth_bias(draw_.depth_layout, state.depth_bias, state.depth_bias_slope, state.depth_bias_clamp, slope,
+                      largest_depth);
 }
 
 Assembler::Source Assembler::window_source(const SetupVertex& v0, const SetupVertex& v1, const SetupVertex& v2,
@@ -426,6 +420,13 @@ std::uint32_t Assembler::vertex_between(const SetupVertex& a, const SetupVertex&
     made.inverse_w = static_cast<float>(1.0 / clip[3]);
     auto* const inputs = const_cast<float*>(made.inputs());
     for (std::uint32_t i = 0; i < draw_.row_count; ++i) inputs[i] = mixed(from.inputs()[i], to.inputs()[i]);
+    if (draw_.plan.in_double) {
+        const double *from_doubles = vertex_doubles(from, draw_.row_count),
+                     *to_doubles = vertex_doubles(to, draw_.row_count);
+        double* const doubles = vertex_doubles(made, draw_.row_count);
+        for (std::uint32_t i = 0; i < 4 + draw_.row_count; ++i)
+            doubles[i] = from_doubles[i] * (1.0 - t) + to_doubles[i] * t;
+    }
     return static_cast<std::uint32_t>(offset / 16);
 }
 
@@ -521,6 +522,18 @@ void sort_into_bins(Chunk& chunk, const ChunkScratch& scratch, std::uint32_t til
 }
 
 }  // namespace
+
+double depth_bias(DepthLayout layout, float constant, float slope_factor, float clamp, double slope,
+                  double largest_depth) {
+    if (constant == 0.0f && slope_factor == 0.0f) return 0.0;
+    double unit = fixed_unit(layout);
+    if (unit == 0.0 && largest_depth > 0.0)
+        unit = std::ldexp(1.0, std::max(std::ilogb(largest_depth), -126) - 23);
+    double result = slope * slope_factor + unit * constant;
+    if (clamp > 0.0f) result = std::min(result, static_cast<double>(clamp));
+    if (clamp < 0.0f) result = std::max(result, static_cast<double>(clamp));
+    return std::isfinite(result) ? result : 0.0;
+}
 
 std::uint32_t primitives_of(rhi::Topology topology, std::uint32_t count) {
     switch (topology) {

@@ -91,7 +91,7 @@ struct ChunkScratch {
     std::vector<CacheEntry> cache;
     std::uint32_t generation = 0;
     std::vector<VertexBatch> batches;
-    AlignedMemory outputs;
+    AlignedMemory outputs, double_outputs;
     /// Clip and cull distances of the segment's vertices, 8 each, where the program has any clip distance.
     std::vector<float> clip_distances;
 };

@@ -48,6 +48,7 @@ void plan_colors(const RasterPipeline& pipeline, const TargetSet& targets, DrawP
         color.components = std::min(output.components, 4u);
         color.blends = state.blend.enabled && !rhi::info(format).is_integer();
         color.blend = state.blend;
+        color.write_mask = static_cast<std::uint8_t>(state.write_mask);
         bool any = false;
         for (std::uint32_t channel = 0; channel < 4; ++channel) {
             const ChannelBits bits = channel_bits(format, channel);
@@ -101,12 +102,13 @@ void plan_tests(const DrawState& state, const TargetSet& targets, bool hierarchi
     plan.shades = fragment.run && (plan.color_count != 0 || fragment.has_side_effects || changes_coverage);
     plan.late_tests = plan.shades && !fragment.early_tests && (changes_coverage || fragment.has_side_effects);
     plan.plain_results = !plan.late_tests && !changes_coverage && targets.samples == 1;
+    if (plan.in_double) plan.plain_results = false;
     for (std::uint32_t i = 0; i < plan.color_count; ++i)
         plan.plain_results = plan.plain_results && !plan.colors[i].blends && !plan.colors[i].partial;
     // A fragment that fails against what is there now also fails against what the draw itself puts in front of it.
     plan.early_rejection = plan.late_tests && !fragment.has_side_effects && !plan.writes_depth && from.depth_test &&
                            !from.stencil_test && keeps_order(from.depth_compare);
-    plan.hierarchical = hierarchical_depth && from.depth_test && !from.stencil_test &&
+    plan.hierarchical = hierarchical_depth && !plan.in_double && from.depth_test && !from.stencil_test &&
                         keeps_order(from.depth_compare) && (!plan.late_tests || plan.early_rejection);
 }
 
@@ -147,8 +149,8 @@ TargetSet target_set(const RenderTargets& targets) {
         const ImageLevel& level = view.levels[0];
         const std::uint32_t bytes = rhi::info(view.format).block_bytes;
         const std::uint32_t words = bytes < 4 ? 1 : bytes / 4;
-        set.colors[i] = {
-            level.data, level.sample_stride, level.row_stride, bytes, view.format, words, set.color_planes, false, {}};
+        set.colors[i] = {level.data, level.sample_stride, level.row_stride, bytes, view.format, words, set.color_planes,
+                         false,      {}, level.shadow};
         if (i < targets.color_clears.size() && targets.color_clears[i] && level.data) {
             set.colors[i].clears = true;
             std::memcpy(set.colors[i].clear, targets.color_clears[i]->data(), bytes);
@@ -170,6 +172,7 @@ TargetSet target_set(const RenderTargets& targets) {
     set.depth = view.levels[0].data;
     set.depth_row_stride = view.levels[0].row_stride;
     set.depth_sample_stride = view.levels[0].sample_stride;
+    set.depth_shadow = view.levels[0].shadow;
     if (!set.depth) set.depth_layout = DepthLayout::none;
     set.depth_clears = targets.depth_clear.has_value() && set.depth_layout != DepthLayout::none;
     if (set.depth_clears)
@@ -201,6 +204,8 @@ void plan_draw(const DrawState& state, const DrawCall& call, const TargetSet& ta
     const std::size_t inputs = std::min(pipeline.fragment.inputs.size(), pipeline.input_slots.size());
     queued.row_count = static_cast<std::uint32_t>((inputs + 3) / 4 * 4);
     queued.vertex_bytes = static_cast<std::uint32_t>(sizeof(ScreenVertex)) + queued.row_count * 4;
+    if (pipeline.vertex.in_double)
+        queued.vertex_bytes += (4 + queued.row_count) * static_cast<std::uint32_t>(sizeof(double));
     queued.input_masks.assign(static_cast<std::size_t>(queued.row_count) * 2, 0);
     for (std::size_t i = 0; i < inputs; ++i) {
         const Interpolation interpolation = pipeline.fragment.inputs[i].interpolation;
@@ -217,6 +222,13 @@ void plan_draw(const DrawState& state, const DrawCall& call, const TargetSet& ta
     plan.linear_masks = queued.input_masks.data();
     plan.flat_masks = queued.input_masks.data() + queued.row_count;
     plan.primitive_bytes = static_cast<std::uint32_t>(sizeof(PrimitiveData) + queued.row_count * sizeof(Plane));
+    plan.in_double = pipeline.vertex.in_double;
+    if (plan.in_double)
+        plan.primitive_bytes +=
+            static_cast<std::uint32_t>(sizeof(DoublePrimitive) + queued.row_count * sizeof(DoublePlane));
+    plan.depth_bias = pipeline.depth_stencil.depth_bias;
+    plan.depth_bias_slope = pipeline.depth_stencil.depth_bias_slope;
+    plan.depth_bias_clamp = pipeline.depth_stencil.depth_bias_clamp;
     plan_colors(pipeline, targets, plan);
     plan_tests(state, targets, hierarchical_depth, plan);
     std::copy(state.blend_constants.begin(), state.blend_constants.end(), plan.blend_constants);

@@ -51,7 +51,7 @@ struct Rasterizer::State {
 
     std::vector<ChunkScratch> scratch;
     std::vector<AlignedMemory> workspaces;
-    std::vector<AlignedMemory> primitive_memory, color_memory;
+    std::vector<AlignedMemory> primitive_memory, color_memory, double_memory;
     std::vector<ChunkView> views;
     std::vector<const DrawPlan*> plans;
     std::vector<std::uint32_t> busy_tiles;
@@ -66,7 +66,8 @@ struct Rasterizer::State {
           scratch(of_scheduler.thread_count()),
           workspaces(of_scheduler.thread_count()),
           primitive_memory(of_scheduler.thread_count()),
-          color_memory(of_scheduler.thread_count()) {
+          color_memory(of_scheduler.thread_count()),
+          double_memory(of_scheduler.thread_count()) {
         for (AlignedMemory& memory : workspaces) {
             memory.reserve(sizeof(Workspace), 0);
             std::memset(memory.data(), 0, sizeof(Workspace));
@@ -174,6 +175,12 @@ struct Rasterizer::State {
             workspace(thread).primitives = primitive_memory[thread].data();
             color_memory[thread].reserve(std::size_t{targets.color_planes} * tile_pixels * sizeof(std::uint32_t), 0);
             workspace(thread).colors = reinterpret_cast<std::uint32_t*>(color_memory[thread].data());
+            workspace(thread).doubles = nullptr;
+            // There may be nothing but targets to clear.
+            if (draw_count == 0 || !draws[0]->plan.in_double) continue;
+            constexpr std::size_t bytes = stream_batches * sizeof(FragmentDoubles);
+            if (double_memory[thread].reserve(bytes, 0)) std::memset(double_memory[thread].data(), 0, bytes);
+            workspace(thread).doubles = reinterpret_cast<FragmentDoubles*>(double_memory[thread].data());
         }
         const TileJob job{&targets,        views.data(), static_cast<std::uint32_t>(views.size()),
                           plans.data(),    lanes,        &srgb_tables(),

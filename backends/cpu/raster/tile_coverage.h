@@ -402,17 +402,26 @@ struct Coverage {
             alive[s] = masks[s];
             if (tests || (draw.early_rejection && run.depth)) {
                 Ints key = ints(0);
+                double exact_depths[16];
                 if (run.depth) {
                     const float offset_x = multisampled ? static_cast<float>(sample_offset_x[s]) / subpixels : 0.5f;
                     const float offset_y = multisampled ? static_cast<float>(sample_offset_y[s]) / subpixels : 0.5f;
-                    key = run.key_at(floats(static_cast<float>(x) + offset_x) + to_floats(load(lane_x)),
-                                     floats(static_cast<float>(y) + offset_y) + to_floats(load(lane_y)));
+                    if (draw.in_double)
+                        key = run.double_keys(x, y, offset_x, offset_y, exact_depths);
+                    else
+                        key = run.key_at(floats(static_cast<float>(x) + offset_x) + to_floats(load(lane_x)),
+                                         floats(static_cast<float>(y) + offset_y) + to_floats(load(lane_y)));
                 }
                 std::int32_t* const depth = run.depth ? run.memory.depth[s] + place : nullptr;
                 if (tests) {
                     alive[s] = test_lanes(draw.depth_stencil, run.front, key, masks[s], depth,
                                           run.stencil ? run.memory.stencil[s] + place : nullptr);
-                    if (alive[s] && draw.depth_stencil.depth_write && run.depth) run.depth_written(place);
+                    if (alive[s] && draw.depth_stencil.depth_write && run.depth) {
+                        run.depth_written(place);
+                        for (std::uint32_t lane = 0; draw.in_double && lane < 16; ++lane)
+                            if (alive[s] >> lane & 1)
+                                store_depth(run.targets, s, x + lane_x[lane], y + lane_y[lane], exact_depths[lane]);
+                    }
                 } else {
                     alive[s] &= mask_of(compare(draw.depth_stencil.compare, key, load(depth)));
                 }

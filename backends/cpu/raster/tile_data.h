@@ -42,6 +42,14 @@ struct alignas(16) ScreenVertex {
 };
 static_assert(sizeof(ScreenVertex) == 32);
 
+/// In double precision: gl_Position and the inputs as doubles, behind the words of a ScreenVertex.
+[[gnu::always_inline]] inline double* vertex_doubles(ScreenVertex& vertex, std::uint32_t row_count) {
+    return reinterpret_cast<double*>(reinterpret_cast<float*>(&vertex + 1) + row_count);
+}
+[[gnu::always_inline]] inline const double* vertex_doubles(const ScreenVertex& vertex, std::uint32_t row_count) {
+    return reinterpret_cast<const double*>(reinterpret_cast<const float*>(&vertex + 1) + row_count);
+}
+
 /// What set-up needs of a vertex, and only set-up.
 struct SetupVertex {
     std::int32_t x, y;  ///< Window coordinates with `subpixel_bits` bits behind the point; valid without `needs_clip`.
@@ -111,6 +119,7 @@ struct ColorTarget {
     std::uint32_t first_plane;  ///< There: of the first sample; the others follow.
     bool clears;                ///< Filled with `clear` before the first draw.
     std::uint32_t clear[4];
+    double* shadow;  ///< ImageLevel::shadow
 };
 struct TargetSet {
     ColorTarget colors[8];
@@ -121,6 +130,7 @@ struct TargetSet {
     std::byte* depth;
     std::uint64_t depth_sample_stride;
     std::uint32_t depth_row_stride;
+    double* depth_shadow;  ///< ImageLevel::shadow
     std::byte* stencil;  ///< Null where there is none.
     std::uint64_t stencil_sample_stride;
     std::uint32_t stencil_row_stride;
@@ -143,6 +153,7 @@ struct ColorPlan {
     std::uint32_t components;
     bool blends, partial;  ///< `partial`: the write mask leaves channels of the format out.
     bool as_it_is;         ///< Texels are the words of the output, without any conversion.
+    std::uint8_t write_mask;  ///< One bit for each channel.
     rhi::BlendState blend;
     std::uint32_t word_masks[4];  ///< Bits of a texel that are written.
 };
@@ -170,7 +181,14 @@ struct DrawPlan {
     std::int32_t x_begin, x_end, y_begin, y_end;  ///< Pixels that may be drawn.
     // Clip coordinates to window coordinates: for planes from clip coordinates.
     double scale[3], translation[3];
+    /// Interpolates, tests and writes doubles (rhi spec "cpu:double").
+    bool in_double;
+    float depth_bias, depth_bias_slope, depth_bias_clamp;
 };
+
+/// Vulkan specification, "Depth Bias Computation".
+double depth_bias(DepthLayout layout, float constant, float slope_factor, float clamp, double slope,
+                  double largest_depth);
 
 /// As many quads go to the fragment function at once.
 inline constexpr std::uint32_t stream_quads = 32;
@@ -202,6 +220,7 @@ struct alignas(64) Workspace {
     std::int32_t stencil[most_samples][tile_pixels];
     Stream streams[most_samples];
     FragmentBatch batches[stream_batches];
+    FragmentDoubles* doubles;      ///< `stream_batches`; null where no draw is in double precision.
     std::uint32_t* colors;         ///< For the whole tile; aligned to 64 bytes.
     std::byte* primitives;         ///< `primitive_slots` of the largest DrawPlan::primitive_bytes.
     std::uint64_t passed_samples;  ///< Counts up.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "backends/cpu/raster/double_precision.h"
 #include "backends/cpu/raster/primitive_setup.h"
 #include "backends/cpu/raster/tile_output.h"
 #include "backends/cpu/raster/tile_pixels.h"
@@ -156,7 +157,8 @@ struct TileRun {
         const std::int32_t y = static_cast<std::int32_t>(region / regions_across) * region_size;
         for (std::uint32_t i = 0; i < draw->color_count; ++i) {
             const std::uint32_t index = draw->colors[i].target;
-            if (loaded_regions[index] >> region & 1) continue;
+            // Targets with doubles are written where they lie.
+            if ((loaded_regions[index] >> region & 1) != 0 || targets.colors[index].shadow) continue;
             loaded_regions[index] |= 1u << region;
             const ColorTarget& target = targets.colors[index];
             for (std::uint32_t sample = 0; sample < targets.samples; ++sample) {
@@ -238,7 +240,7 @@ struct TileRun {
         limits[0] = larger(draw->x_begin - tile_x, 0), limits[1] = larger(draw->y_begin - tile_y, 0);
         limits[2] = larger(~(draw->x_end - tile_x - 1), ~(width - 1));
         limits[3] = larger(~(draw->y_end - tile_y - 1), ~(height - 1));
-        simple_depth = targets.samples == 1 && !draw->late_tests && !stencil;
+        simple_depth = targets.samples == 1 && !draw->late_tests && !stencil && !draw->in_double;
         depth_low = plan.clamps && plan.clamp_low > 0.0f ? plan.clamp_low : 0.0f;
         depth_high = plan.clamps ? plan.clamp_high : 1.0f;
         farthest_key = depth_key(targets.depth_layout, 1.0f, 0.0f, 1.0f);
@@ -257,6 +259,23 @@ struct TileRun {
     }
     [[gnu::always_inline]] Ints key_at(const Floats& x, const Floats& y) const {
         return depth_key(targets.depth_layout, depth_at(x, y), depth_low, depth_high);
+    }
+
+    /// In double precision: depths of a sample of the pixels of the block at (x, y), clamped, and their keys.
+    Ints double_keys(std::int32_t x, std::int32_t y, float offset_x, float offset_y, double (&depths)[16]) {
+        const DoublePrimitive& planes = double_primitive(current_primitive(), *draw);
+        alignas(64) float rounded[16];
+        for (std::uint32_t lane = 0; lane < 16; ++lane) {
+            const double z = raster::depth_at(planes, x + lane_x[lane] + static_cast<double>(offset_x),
+                                              y + lane_y[lane] + static_cast<double>(offset_y));
+            keep_depth(z, depths[lane], rounded[lane]);
+        }
+        return depth_key(targets.depth_layout, load(rounded), depth_low, depth_high);
+    }
+    void keep_depth(double z, double& kept, float& rounded) const {
+        kept = z > static_cast<double>(depth_low) ? z : static_cast<double>(depth_low);
+        if (kept > static_cast<double>(depth_high)) kept = static_cast<double>(depth_high);
+        rounded = static_cast<float>(z);
     }
 
     /// @param place  of a block, or of a quad in it
@@ -357,6 +376,7 @@ struct TileRun {
                 memory.primitives + static_cast<std::size_t>(next_slot) * draw->primitive_bytes);
             next_slot = (next_slot + 1) % primitive_slots;
             set_up_primitive(*draw, *record, vertex_memory, *slot);
+            if (draw->in_double) set_up_double_primitive(*draw, targets.depth_layout, *record, vertex_memory, *slot);
             primitive = slot;
         }
         return *primitive;
@@ -464,6 +484,7 @@ struct TileRun {
         const Int4 pixels = (entries >> static_cast<int>(Stream::live_shift)) << Int4{0, 4, 8, 12};
         batch.live = static_cast<std::uint32_t>(pixels[0]);
         for (std::uint32_t quad = 1; quad < quads; ++quad) batch.live |= static_cast<std::uint32_t>(pixels[quad]);
+        batch.doubles = memory.doubles ? memory.doubles + (&batch - memory.batches) : nullptr;
         if (targets.samples == 1) return;
         const bool single = draw->runs_per_sample;
         set_samples(batch, stream_index, single);
@@ -583,9 +604,26 @@ struct TileRun {
                             std::uint32_t mask, bool one_by_one, std::uint32_t quads) {
         if (!depth && !stencil) return mask;
         Ints key = ints(0);
+        double exact_depths[16];
         if (depth) {
             alignas(64) float z[16];
-            if (draw->writes_depth) {
+            if (draw->in_double) {
+                const float offset_x =
+                    targets.samples == 1 ? 0.5f : static_cast<float>(sample_offset_x[sample]) / subpixels;
+                const float offset_y =
+                    targets.samples == 1 ? 0.5f : static_cast<float>(sample_offset_y[sample]) / subpixels;
+                for (std::uint32_t lane = 0; lane < 16; ++lane) {
+                    const std::uint32_t quad = lane / 4 < quads ? lane / 4 : 0;
+                    const double x =
+                        batch.x[quad] + static_cast<std::int32_t>(lane & 1) + static_cast<double>(offset_x);
+                    const double y =
+                        batch.y[quad] + static_cast<std::int32_t>(lane >> 1 & 1) + static_cast<double>(offset_y);
+                    const double exact = draw->writes_depth
+                                             ? batch.doubles->depth[lane]
+                                             : raster::depth_at(double_primitive(*batch.primitives[quad], *draw), x, y);
+                    keep_depth(exact, exact_depths[lane], z[lane]);
+                }
+            } else if (draw->writes_depth) {
                 std::memcpy(z, batch.depth, sizeof(z));
             } else {
                 const float offset_x =
@@ -616,6 +654,10 @@ struct TileRun {
                 if (depth && draw->depth_stencil.depth_write && (passed >> (4 * quad) & 15) != 0) {
                     std::memcpy(memory.depth[sample] + places[quad], depths + 4 * quad, 16);
                     depth_written(places[quad]);
+                    for (std::uint32_t i = 0; draw->in_double && i < 4; ++i)
+                        if (passed >> (4 * quad + i) & 1)
+                            store_depth(targets, sample, batch.x[quad] + static_cast<std::int32_t>(i & 1),
+                                        batch.y[quad] + static_cast<std::int32_t>(i >> 1), exact_depths[4 * quad + i]);
                 }
                 if (stencil) std::memcpy(memory.stencil[sample] + places[quad], stencils + 4 * quad, 16);
             }
@@ -632,6 +674,11 @@ struct TileRun {
                      std::uint32_t quads, const std::uint32_t (&masks)[most_samples], std::uint32_t first,
                      std::uint32_t end, bool conflict) {
         const ColorTarget& target = targets.colors[plan.target];
+        if (draw->in_double && target.shadow) {
+            for (std::uint32_t sample = first; sample < end; ++sample)
+                if (masks[sample] != 0) write_double_colors(*draw, plan, target, batch, sample, masks[sample]);
+            return;
+        }
         alignas(64) std::uint32_t words[4][16];
         const bool reads = plan.blends || plan.partial;
         if (!reads) pack_colors(plan, target, *job.srgb, batch, words);

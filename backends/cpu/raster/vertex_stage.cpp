@@ -100,6 +100,12 @@ void run_vertices(const Segment& segment, const QueuedDraw& draw, const Kernels&
     if (scratch.outputs.reserve(batches_at_once * batch_words * sizeof(float), 0))
         std::memset(scratch.outputs.data(), 0, batches_at_once * batch_words * sizeof(float));
     auto* const outputs = reinterpret_cast<float*>(scratch.outputs.data());
+    auto* doubles = static_cast<double*>(nullptr);
+    if (draw.plan.in_double) {
+        if (scratch.double_outputs.reserve(batches_at_once * batch_words * sizeof(double), 0))
+            std::memset(scratch.double_outputs.data(), 0, batches_at_once * batch_words * sizeof(double));
+        doubles = reinterpret_cast<double*>(scratch.double_outputs.data());
+    }
     scratch.batches.resize(batches_at_once);
     std::vector<const float*> rows(draw.row_count, zero_row);
 
@@ -112,6 +118,7 @@ void run_vertices(const Segment& segment, const QueuedDraw& draw, const Kernels&
                 batch.indices[lane] = scratch.indices[next + (lane < batch.count ? lane : 0)];
             batch.instance = segment.instance;
             batch.outputs = outputs + batch_count * batch_words;
+            batch.doubles = doubles ? doubles + batch_count * batch_words : nullptr;
             next += batch.count;
         }
         program.run(&draw.context, &draw.vertex, scratch.batches.data(), batch_count);
@@ -139,6 +146,17 @@ void run_vertices(const Segment& segment, const QueuedDraw& draw, const Kernels&
             finish.first_offset = static_cast<std::uint32_t>(byte / 16);
             finish.setup = scratch.setup.data() + done;
             kernels.finish_vertices(finish);
+            for (std::uint32_t lane = 0; batch.doubles && lane < batch.count; ++lane) {
+                auto& vertex =
+                    *reinterpret_cast<ScreenVertex*>(finish.vertices + std::size_t{lane} * draw.vertex_bytes);
+                double* const to = vertex_doubles(vertex, draw.row_count);
+                for (std::size_t axis = 0; axis < 4; ++axis)
+                    to[axis] = batch.doubles[(slot_position + axis) * max_lanes + lane];
+                for (std::size_t input = 0; input < draw.row_count; ++input) {
+                    const std::uint32_t slot = input < pipeline.input_slots.size() ? pipeline.input_slots[input] : ~0u;
+                    to[4 + input] = slot < output_slots ? batch.doubles[std::size_t{slot} * max_lanes + lane] : 0.0;
+                }
+            }
             if (is_points && program.writes_point_size)
                 std::copy_n(batch.outputs + slot_point_size * max_lanes, batch.count,
                             scratch.point_sizes.begin() + done);
