@@ -213,6 +213,8 @@ class Backend {
         std::string_view name, meaning;
     };
     [[nodiscard]] virtual std::span<const Mode> modes() const = 0;
+    /// What can be looked for while shaders run, each a word beside the mode, with a sentence for help texts.
+    [[nodiscard]] virtual std::span<const Mode> checks() const { return {}; }
     /// True where `lanes=` or `threads=` mean something.
     [[nodiscard]] virtual bool accepts_lanes() const { return false; }
     [[nodiscard]] virtual bool accepts_threads() const { return false; }

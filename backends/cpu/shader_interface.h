@@ -16,6 +16,7 @@ namespace nacre::cpu {
 
 struct ImageView;
 struct SamplerState;
+class CommandChecks;
 
 inline constexpr std::uint32_t max_lanes = 16;
 inline constexpr std::uint32_t max_quads = max_lanes / 4;
@@ -46,6 +47,7 @@ struct ShaderContext {
     std::uint32_t group_sizes[max_groups];  ///< Descriptors in each group (bounds unbounded arrays).
     const std::byte* push_constants;        ///< `push_constant_capacity` bytes, aligned to 16.
     ExecutionState* state;
+    const CommandChecks* checks;            ///< For code that looks for faults (checks/check_interface.h); else null.
 };
 
 // ---- Compute -------------------------------------------------------------------------------------------------------------

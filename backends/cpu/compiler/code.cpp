@@ -31,6 +31,7 @@
 #include <llvm/Transforms/Scalar/SROA.h>
 #include <llvm/Transforms/Scalar/SimplifyCFG.h>
 
+#include "backends/cpu/checks/check_functions.h"
 #include "backends/cpu/images/image_operations.h"
 #include "backends/cpu/rays/ray_query.h"
 #include "backends/cpu/shader_interface.h"
@@ -199,6 +200,11 @@ class OrcGenerator final : public CodeGenerator {
             symbols[jit_->mangleAndIntern(symbol)] = {llvm::orc::ExecutorAddr::fromPtr(function), llvm::JITSymbolFlags::Exported | llvm::JITSymbolFlags::Callable};
         };
         define("nacre_cpu_image", image_function(lanes_));
+        define("nacre_cpu_check_begin", check_begin_function());
+        define("nacre_cpu_check_workgroup", check_workgroup_function());
+        define("nacre_cpu_check_fault", check_fault_function());
+        define("nacre_cpu_check_memory", check_memory_function());
+        define("nacre_cpu_check_image", check_image_function());
         define("nacre_cpu_ray_proceed", ray_proceed_function());
         define("nacre_cpu_ray_confirm", ray_confirm_function());
         define("nacre_cpu_ray_property", ray_property_function());

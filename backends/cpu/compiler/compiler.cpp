@@ -92,7 +92,8 @@ class ShaderCompilation final : public Compiler {
     /// Runs `emit` on a new LLVM module and makes code of it; `emit` tells whether it has coroutines.
     template <typename Emit>
     Expected<std::shared_ptr<CompiledCode>> compile(const ShaderSource& source, spv::ExecutionModel model, const VertexInput& input, Emit&& emit) {
-        NACRE_TRY(const std::vector<std::uint32_t> words, legalize(source.spirv, source.specialization, source.name));
+        NACRE_TRY(const std::vector<std::uint32_t> words, legalize(source.spirv, source.specialization, source.name,
+                                                             (options_.checks & check_sanitize) != 0));
         NACRE_TRY(const Module module, Module::parse(words, source.entry_point, model, source.name));
         llvm::LLVMContext context;
         auto target = std::make_unique<llvm::Module>("shader", context);
@@ -130,8 +131,8 @@ class ShaderCompilation final : public Compiler {
     }
 
     Hash128 key_of(std::span<const std::uint32_t> words, const ShaderSource& source, spv::ExecutionModel model, const VertexInput& input) const {
-        std::string text = fmt::format("{} {} {} {} {} {} {}\n", nacre_cpu_compiler_sources, options_.lanes, static_cast<int>(options_.mode),
-                                       static_cast<int>(model), source.entry_point, generator_->fingerprint(), words.size());
+        std::string text = fmt::format("{} {} {} {} {} {} {} {}\n", nacre_cpu_compiler_sources, options_.lanes, static_cast<int>(options_.mode),
+                                       options_.checks, static_cast<int>(model), source.entry_point, generator_->fingerprint(), words.size());
         for (const BindingSlots& slot : source.slots) text += fmt::format("s{} {} {} {}\n", slot.set, slot.binding, slot.first, slot.count);
         for (const rhi::VertexAttribute& at : input.attributes)
             text += fmt::format("a{} {} {} {}\n", at.location, at.buffer, at.offset, static_cast<int>(at.format));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <llvm/IR/Constants.h>
 
+#include "backends/cpu/checks/check_functions.h"
 #include "backends/cpu/compiler/emitter.h"
 
 namespace nacre::cpu {
@@ -8,6 +9,18 @@ namespace nacre::cpu {
 using spv::Op;
 
 Component Emitter::zero(const Type& scalar) { return llvm::Constant::getNullValue(scalar_type(scalar)); }
+
+Component Emitter::undefined_value(const Type& scalar) {
+    Component value = zero(scalar);
+    if (looks_for(check_hostile) && scalar.kind != TypeKind::boolean) {
+        const llvm::APInt bits(scalar.bits, poison_word(0) * 0x100000001ull);
+        value = scalar.kind == TypeKind::floating
+                    ? llvm::ConstantFP::get(context, llvm::APFloat(value.value->getType()->getFltSemantics(), bits))
+                    : static_cast<llvm::Value*>(llvm::ConstantInt::get(context, bits));
+    }
+    if (follows_undefined()) value.undefined = builder.getTrue();
+    return value;
+}
 
 Value Emitter::constant(Id id) {
     if (const auto found = constants_.find(id); found != constants_.end()) return found->second;
@@ -44,7 +57,9 @@ Value Emitter::constant(Id id) {
         case Op::OpConstantNull:
         default:
             if (type.kind == TypeKind::pointer) reject("null pointers are not supported");
-            for_each_component_type(at.type, [&](const Type& scalar) { value.components.push_back(zero(scalar)); });
+            for_each_component_type(at.type, [&](const Type& scalar) {
+                value.components.push_back(at.op == Op::OpUndef ? undefined_value(scalar) : zero(scalar));
+            });
     }
     constants_.emplace(id, value);
     return value;
@@ -91,8 +106,12 @@ Value Emitter::get(Id id) {
     Value value = found->second;
     const auto& slots_of = is_outside ? where.outside_slots : where.slots;
     for (std::size_t i = 0; i < value.components.size(); ++i)
-        if (i < slots_of.size() && slots_of[i])
+        if (i < slots_of.size() && slots_of[i]) {
             value.components[i] = Component(builder.CreateLoad(slots_of[i]->getAllocatedType(), slots_of[i]));
+            if (i < where.undefined_slots.size() && where.undefined_slots[i] && !is_outside)
+                value.components[i].undefined =
+                    builder.CreateLoad(where.undefined_slots[i]->getAllocatedType(), where.undefined_slots[i]);
+        }
     return value;
 }
 
@@ -100,7 +119,11 @@ void Emitter::set(const Instruction& at, std::vector<Component> components) {
     // What the analysis holds for uniform is kept as a scalar, so that slots and branches can rely on it.
     if (!uniformity.is_divergent(at.result))
         for (Component& component : components)
-            if (!component.is_uniform()) component = Component(narrow(component, mask));
+            if (!component.is_uniform()) {
+                llvm::Value* undefined = component.undefined;
+                component = Component(narrow(component, mask));
+                component.undefined = undefined ? any(both(mask, undefined)) : nullptr;
+            }
     define(at.result).components = std::move(components);
     finish_definition(at.result);
 }
@@ -122,6 +145,12 @@ void Emitter::finish_definition(Id id) {
             llvm::AllocaInst* slot = make_slot(component.value->getType(), "value");
             builder.CreateStore(component.value, slot);
             definition.slots.push_back(slot);
+            if (component.undefined) {
+                definition.undefined_slots.resize(definition.slots.size());
+                llvm::AllocaInst* undefined = make_slot(component.undefined->getType(), "undefined");
+                builder.CreateStore(component.undefined, undefined);
+                definition.undefined_slots.back() = undefined;
+            }
             if (!differs) continue;
             // Lanes that have left the loop keep what they had.
             llvm::Type* wide = component.is_uniform() ? vector_of(component.value->getType()) : component.value->getType();

@@ -216,6 +216,7 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
         }
         default: return false;
     }
+    if (looks_for(check_sanitize)) check_quads();
     std::vector<Component> made;
     for (const Component& value : get(at.operand(0)).components) {
         if (!both_ways) {
@@ -235,6 +236,7 @@ void FragmentEmitter::store_outputs() {
         const Variable* variable = module.variable(id);
         if (!variable || variable->storage != spv::StorageClass::Output) continue;
         const std::vector<Component> values = load(pointer_to(id));
+        if (options.checks) check_outputs(*variable, values);
         if (variable->builtin) {
             const auto put = [&](std::size_t offset) {
                 builder.CreateAlignedStore(widen(to_word(values.at(0))), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
@@ -302,6 +304,7 @@ void FragmentEmitter::emit_batch() {
     llvm::Value* live_bits = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, live)), llvm::Align(4));
     store_live(builder.CreateBitCast(builder.CreateTrunc(live_bits, builder.getIntNTy(lanes)), mask_type));
     mask = all_lanes();
+    if (options.checks) begin_checks(rhi::ShaderStage::fragment, batch, nullptr, nullptr);
     declare_variables();
     emit_function(module.entry(), {}, all_lanes());
     mask = all_lanes();

@@ -10,7 +10,8 @@
 namespace nacre::cpu {
 
 Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> words,
-                                              std::span<const rhi::SpecializationConstant> specialization, std::string_view name) {
+                                              std::span<const rhi::SpecializationConstant> specialization, std::string_view name,
+                                              bool keeps_variables) {
     const std::uint32_t version = words.size() > 1 ? words[1] : 0x10300;
     const spv_target_env environment = version <= 0x10300   ? SPV_ENV_VULKAN_1_1
                                        : version == 0x10400 ? SPV_ENV_VULKAN_1_1_SPIRV_1_4
@@ -45,13 +46,14 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
     optimizer.RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
         .RegisterPass(spvtools::CreatePrivateToLocalPass())
         .RegisterPass(spvtools::CreateInlineExhaustivePass())
-        .RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
-        .RegisterPass(spvtools::CreateScalarReplacementPass(100))
-        .RegisterPass(spvtools::CreateLocalAccessChainConvertPass())
-        .RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass())
-        .RegisterPass(spvtools::CreateLocalSingleStoreElimPass())
-        .RegisterPass(spvtools::CreateSSARewritePass())
-        .RegisterPass(spvtools::CreateAggressiveDCEPass(true));
+        .RegisterPass(spvtools::CreateEliminateDeadFunctionsPass());
+    if (!keeps_variables)
+        optimizer.RegisterPass(spvtools::CreateScalarReplacementPass(100))
+            .RegisterPass(spvtools::CreateLocalAccessChainConvertPass())
+            .RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass())
+            .RegisterPass(spvtools::CreateLocalSingleStoreElimPass())
+            .RegisterPass(spvtools::CreateSSARewritePass());
+    optimizer.RegisterPass(spvtools::CreateAggressiveDCEPass(true));
     spvtools::OptimizerOptions options;
     options.set_run_validator(false);
     std::vector<std::uint32_t> result;
