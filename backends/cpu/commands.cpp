@@ -30,7 +30,7 @@ bool is_executed(CommandType type) {
 
 }  // namespace
 
-FlatPlan flatten(const rhi::ExecutionPlan& plan) {
+FlatPlan flatten(const rhi::ExecutionPlan& plan, bool for_checks) {
     FlatPlan flat;
     flat.serial = plan.serial;
     std::size_t total = 0;
@@ -42,27 +42,33 @@ FlatPlan flatten(const rhi::ExecutionPlan& plan) {
     for (rhi::CommandStream* stream : plan.streams) {
         const CommandHeader begin{static_cast<CommandType>(begin_list_command), 0, sizeof(CommandHeader)};
         append(flat, &begin, sizeof begin);
+        if (for_checks) flat.lists.push_back({stream->name, stream->strings});
         stream->for_each([&](const CommandHeader& header, const std::byte*) {
-            if (is_executed(header.type)) append(flat, &header, header.bytes);
+            if (for_checks || is_executed(header.type)) append(flat, &header, header.bytes);
         });
     }
     return flat;
 }
 
-Executor::Executor(Scheduler& scheduler, Watchdog& watchdog, std::uint32_t lanes)
+Executor::Executor(Scheduler& scheduler, Watchdog& watchdog, std::uint32_t lanes, const ExecutorChecks& checks)
     : scheduler_(scheduler),
       watchdog_(watchdog),
       transfer_(scheduler),
       rasterizer_(scheduler, lanes),
+      checks_(checks),
       workgroup_memory_(scheduler.thread_count()),
       scratch_(std::make_shared<HostMemory>(machine_memory_bytes())) {
     reset_state();
 }
 
 std::string Executor::execute(const FlatPlan& plan) {
+    plan_ = &plan;
+    list_ = 0;
     for (std::size_t at = 0; at < plan.words.size() && stopped_.empty();) {
         const auto& header = *reinterpret_cast<const CommandHeader*>(plan.words.data() + at);
-        execute(header, reinterpret_cast<const std::byte*>(&header) + sizeof(CommandHeader));
+        const std::byte* payload = reinterpret_cast<const std::byte*>(&header) + sizeof(CommandHeader);
+        execute(header, payload);
+        if (checks_.flags) note_transfer(header, payload);
         at += header.bytes / 8;
     }
     if (in_pass_) {
@@ -71,6 +77,9 @@ std::string Executor::execute(const FlatPlan& plan) {
         in_pass_ = false;
     }
     reset_state();
+    forget_checks();
+    if (checks_.log) checks_.log->send();
+    plan_ = nullptr;
     return stopped_;
 }
 
@@ -91,6 +100,7 @@ void Executor::execute(const CommandHeader& header, const std::byte* payload) {
         return *static_cast<CpuQueryPool*>(command.pool.object);
     };
 #define NACRE_COMMAND(type) as(std::type_identity<rhi::type>{})
+    if (checks_.flags) note_name(header, payload);
     if (static_cast<std::uint16_t>(header.type) == begin_list_command) return reset_state();
     switch (header.type) {
         case CommandType::begin_render_pass: return begin_render_pass(NACRE_COMMAND(BeginRenderPassCommand));

@@ -58,14 +58,16 @@ CpuDevice::CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc&
       capabilities_(find_capabilities(options.mode == ExecutionMode::consistent ? max_lanes : options.lanes)),
       faults_(desc.desc->faults),
       memory_(std::make_shared<HostMemory>(machine_memory_bytes(), desc.desc->faults.fail_allocation)),
+      checks_(options.checks),
+      faults_seen_(desc.report),
       compiler_(std::move(compiler)),
       scheduler_(Scheduler::create(options.threads)),
       watchdog_(watchdog_limit()),
-      executor_(*scheduler_, watchdog_, options.lanes) {}
+      executor_(*scheduler_, watchdog_, options.lanes, {options.checks, options.seed, &faults_seen_}) {}
 
 Expected<std::unique_ptr<rhi::BackendDevice>> CpuDevice::create(const DeviceOptions& options,
                                                                 const rhi::BackendDeviceDesc& desc) try {
-    NACRE_TRY(auto compiler, Compiler::create({.lanes = options.lanes, .mode = options.mode}));
+    NACRE_TRY(auto compiler, Compiler::create({.lanes = options.lanes, .mode = options.mode, .checks = options.checks}));
     std::unique_ptr<CpuDevice> device(new CpuDevice(options, desc, std::move(compiler)));
     if (log_is_on(LogLevel::debug))
         log_message(LogLevel::debug,
@@ -99,11 +101,11 @@ void CpuDevice::lose(const std::string& reason) {
 
 Expected<std::unique_ptr<rhi::BackendBuffer>> CpuDevice::create_buffer(const rhi::BufferDesc& desc) {
     NACRE_CHECK(check_lost("create buffer"));
-    return CpuBuffer::create(memory_, desc);
+    return CpuBuffer::create(memory_, desc, checks_);
 }
 Expected<std::unique_ptr<rhi::BackendTexture>> CpuDevice::create_texture(const rhi::TextureDesc& desc) {
     NACRE_CHECK(check_lost("create texture"));
-    return CpuTexture::create(memory_, desc);
+    return CpuTexture::create(memory_, desc, checks_);
 }
 Expected<std::unique_ptr<rhi::BackendSampler>> CpuDevice::create_sampler(const rhi::SamplerDesc& desc) {
     NACRE_CHECK(check_lost("create sampler"));
@@ -165,7 +167,7 @@ Expected<void> CpuDevice::execute(const rhi::ExecutionPlan& plan) try {
         lose("planted by FaultInjection::lose_device");
     }
     NACRE_CHECK(check_lost("submit"));
-    queue_.post([this, flat = flatten(plan)] { run_plan(flat); });
+    queue_.post([this, flat = flatten(plan, checks_ != 0)] { run_plan(flat); });
     return {};
 } catch (const std::bad_alloc&) {
     return fail(ErrorCode::out_of_memory, "submit", adapter_.name, "there is no memory for the commands",

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <string>
 
+#include "backends/cpu/checks/fault_log.h"
 #include "backends/cpu/commands.h"
 #include "backends/cpu/compiler/compiler.h"
 #include "backends/cpu/queue.h"
@@ -18,6 +19,8 @@ struct DeviceOptions {
     ExecutionMode mode = ExecutionMode::fast;
     std::uint32_t lanes = 16;   ///< 4, 8 or 16.
     std::uint32_t threads = 0;  ///< 0: one for each core.
+    std::uint32_t checks = 0;   ///< CheckFlags
+    std::uint32_t seed = 0;     ///< Of hostile orders.
 };
 
 /// This machine as an adapter.
@@ -72,6 +75,8 @@ class CpuDevice : public rhi::BackendDevice {
     rhi::Capabilities capabilities_;
     rhi::FaultInjection faults_;
     std::shared_ptr<HostMemory> memory_;
+    const std::uint32_t checks_;
+    FaultLog faults_seen_;
     std::unique_ptr<Compiler> compiler_;
     std::shared_ptr<RayDevice> rays_;  ///< Made when the first acceleration structure is.
     std::unique_ptr<Scheduler> scheduler_;

@@ -57,6 +57,8 @@ ShaderContext Executor::make_context() {
 
 void Executor::look_at_watchdog(const std::string& shader) {
     if (!stopped_.empty() || !watchdog_.has_expired()) return;
+    if (checks_.log) stopped_ = checks_.log->stop();
+    if (!stopped_.empty()) return;
     const double seconds = std::chrono::duration<double>(watchdog_.limit()).count();
     stopped_ = fmt::format("shader {} ran for longer than {} s and was stopped (NACRE_CPU_WATCHDOG_SECONDS)",
                            shader.empty() ? "of an empty pass" : shader, seconds);
@@ -67,6 +69,7 @@ void Executor::draw(const DrawCall& call, std::uint32_t draw_index) {
     DrawState state;
     state.pipeline = &pipeline_->raster;
     state.context = make_context();
+    if (checks_.flags) state.context.checks = make_checks("draw", ++draws_);
     for (std::size_t i = 0; i < vertex_buffers_.size(); ++i) {
         const VertexBuffer& bound = vertex_buffers_[i];
         const std::uint64_t size = bound.buffer ? bound.buffer->size_from(bound.offset) : 0;
@@ -150,7 +153,12 @@ void Executor::dispatch(rhi::DispatchArguments groups) {
         memory = MemoryBlock(scratch_, std::max<std::uint64_t>(program.workgroup_bytes, 64));
         if (!memory.data()) throw std::bad_alloc();
     }
-    const ShaderContext context = make_context();
+    ShaderContext context = make_context();
+    if (checks_.flags) {
+        begin_scope();
+        prepare_workgroup_checks();
+        context.checks = make_checks("dispatch", ++dispatches_);
+    }
     // Enough parts that threads finish together; neighbors stay together for the sake of caches.
     constexpr std::uint64_t parts_for_each_thread = 32;
     const auto parts =

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "backends/cpu/checks/check_functions.h"
+
 namespace nacre::cpu {
 namespace {
 
@@ -43,7 +45,7 @@ rhi::ViewDimension whole_dimension(const rhi::TextureDesc& desc) {
 std::uint32_t stored_texel_bytes(rhi::Format format) { return rhi::info(format).block_bytes; }
 
 Expected<std::unique_ptr<rhi::BackendTexture>> CpuTexture::create(const std::shared_ptr<HostMemory>& memory,
-                                                                  const rhi::TextureDesc& desc) {
+                                                                  const rhi::TextureDesc& desc, std::uint32_t checks) {
     const rhi::FormatInfo& facts = rhi::info(desc.format);
     if (desc.mips > max_mips)
         return fail(ErrorCode::unsupported, "create texture", fmt::format("'{}'", desc.name),
@@ -75,6 +77,11 @@ Expected<std::unique_ptr<rhi::BackendTexture>> CpuTexture::create(const std::sha
         if (facts.has_stencil) whole.stencil_levels[mip].data = data + stencil_offsets[mip];
     }
     texture->memory_bytes = bytes;
+    if (checks) {
+        const bool is_poisoned = (checks & (check_sanitize | check_hostile)) != 0;
+        texture->checked = std::make_unique<CheckedMemory>(fmt::format("texture '{}'", desc.name), data, bytes, !is_poisoned);
+        if (is_poisoned) poison(data, bytes);
+    }
     return texture;
 }
 

@@ -56,8 +56,11 @@ std::string object_text(const CheckSite& site, const CheckedMemory* memory) {
 void add_fault(const RunningInvocations& running, const CheckSite& site, ShaderFault kind, std::uint32_t lanes,
                const CheckedMemory* memory, const std::function<std::string(std::uint32_t lane)>& reason) {
     const CommandChecks& checks = *running.context->checks;
+    using enum ShaderFault;
+    const bool stops = (checks.flags & check_traps) &&
+                       (kind == not_a_number || kind == infinity || kind == division_by_zero || kind == index_range);
     checks.log->add(kind, &site, memory ? memory->name() : std::string(),
-                    static_cast<std::uint32_t>(std::popcount(lanes)), [&] {
+                    static_cast<std::uint32_t>(std::popcount(lanes)), stops, [&] {
                         const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
                         FoundFault fault;
                         fault.subject = fmt::format("'{}'", or_empty(site.shader));
@@ -66,10 +69,7 @@ void add_fault(const RunningInvocations& running, const CheckSite& site, ShaderF
                         fault.reason = reason(lane);
                         return fault;
                     });
-    using enum ShaderFault;
-    const bool is_trap = kind == not_a_number || kind == infinity || kind == division_by_zero || kind == index_range;
-    if (is_trap && (checks.flags & check_traps))
-        std::atomic_ref(checks.state->expired).store(1, std::memory_order_relaxed);
+    if (stops) std::atomic_ref(checks.state->expired).store(1, std::memory_order_relaxed);
 }
 
 const CheckedMemory* object_of(const CommandChecks& checks, const RunningInvocations& running, std::int32_t set,
@@ -101,11 +101,13 @@ void begin_workgroup(const ShaderContext* context, std::byte* memory, std::uint6
 }
 
 void fault(const RunningInvocations* running, const CheckSite* site, std::uint32_t kind_number, std::uint32_t lanes,
-           const std::int64_t* found, const std::int64_t* limit) {
+           const Descriptor* descriptor, const std::int64_t* found, const std::int64_t* limit) {
     if (lanes == 0) return;
     const auto kind = static_cast<ShaderFault>(kind_number);
-    add_fault(*running, *site, kind, lanes, nullptr, [&](std::uint32_t lane) -> std::string {
-        const std::string object = object_text(*site, nullptr);
+    const CheckedMemory* memory =
+        descriptor ? object_of(*running->context->checks, *running, site->set, descriptor) : nullptr;
+    add_fault(*running, *site, kind, lanes, memory, [&](std::uint32_t lane) -> std::string {
+        const std::string object = object_text(*site, memory);
         switch (kind) {
             using enum ShaderFault;
             case not_a_number: return "expected a number, found a NaN that no operand was";
@@ -115,8 +117,12 @@ void fault(const RunningInvocations* running, const CheckSite* site, std::uint32
                 return fmt::format("expected an index below {} into {}, found {}", limit ? limit[lane] : 0,
                                    object.empty() ? "an array" : object, found ? found[lane] : 0);
             case uninitialized_read:
-                return fmt::format("expected a value that was written, found {}that depends on what was not",
-                                   object.empty() ? std::string("one ") : object + " or a value ");
+                if (running->undefined_site && running->undefined_lanes >> lane & 1)
+                    return fmt::format("expected a value that was written, found one that depends on what was not: {}, read at {}",
+                                       object_text(*running->undefined_site, running->undefined_memory),
+                                       running->undefined_site->place ? running->undefined_site->place : "an unknown line");
+                return fmt::format("expected a value that was written, found one that depends on what was not{}{}",
+                                   object.empty() ? "" : ": ", object);
             case nonuniform_derivative:
                 return "expected all pixels of a quad to run here, found some that do not";
             default: return "";
@@ -157,7 +163,14 @@ void note_race(const RunningInvocations& running, const CheckSite& site, const A
     }
 }
 
-std::uint32_t memory(const RunningInvocations* running, const CheckSite* site, const Descriptor* const* descriptors,
+void note_undefined(RunningInvocations& running, const CheckSite& site, const CheckedMemory* memory, std::uint32_t lanes) {
+    if (lanes == 0) return;
+    running.undefined_site = &site;
+    running.undefined_memory = memory;
+    running.undefined_lanes = lanes;
+}
+
+std::uint32_t memory(RunningInvocations* running, const CheckSite* site, const Descriptor* const* descriptors,
                      std::byte* const* addresses, std::uint32_t bytes, std::uint32_t access, std::uint32_t lanes,
                      std::uint32_t undefined) {
     const CommandChecks& checks = *running->context->checks;
@@ -173,7 +186,10 @@ std::uint32_t memory(const RunningInvocations* running, const CheckSite* site, c
         const auto offset = at.memory->offset_of(addresses[lane]);
         if (!offset) continue;
         at.offset = *offset;
-        if ((access & access_read) && at.memory->is_undefined(at.offset, bytes)) read_undefined |= 1u << lane;
+        if ((access & access_read) && at.memory->is_undefined(at.offset, bytes)) {
+            read_undefined |= 1u << lane;
+            note_undefined(*running, *site, at.memory, read_undefined);
+        }
         if (access & access_shared) note_race(*running, *site, at, bytes, access, lane);
         if (access & access_write) at.memory->define(at.offset, bytes, !(undefined >> lane & 1));
     }
@@ -225,7 +241,7 @@ TexelPlace find_texel(const ImageView& view, const ImageArguments& arguments, st
     return place;
 }
 
-std::uint32_t image(const RunningInvocations* running, const CheckSite* site, const Descriptor* descriptor,
+std::uint32_t image(RunningInvocations* running, const CheckSite* site, const Descriptor* descriptor,
                     const Descriptor*, ImageArguments* arguments, std::uint32_t flags, std::uint32_t lanes) {
     const CommandChecks& checks = *running->context->checks;
     const ImageView* view = descriptor->image;
@@ -258,6 +274,7 @@ std::uint32_t image(const RunningInvocations* running, const CheckSite* site, co
             note_race(*running, *site, at, std::min(view->texel_bytes, 4u), access, lane);
         if (access & access_write) known->define(at.offset, view->texel_bytes);
     }
+    note_undefined(*running, *site, known, read_undefined);
     return read_undefined;
 }
 

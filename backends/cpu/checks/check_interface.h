@@ -18,6 +18,8 @@ enum CheckFlags : std::uint32_t {
     check_hostile = 4,   ///< Whatever order and whatever content is allowed is the one that hurts most.
 };
 
+class CheckedMemory;
+
 /// A place in a shader, as the compiler writes it into the code. Texts end with 0 and may be null.
 struct CheckSite {
     const char* shader;
@@ -36,6 +38,10 @@ struct RunningInvocations {
     std::uint32_t size[3];  ///< Of a workgroup.
     std::uint32_t barriers;  ///< Workgroup barriers behind them.
     std::uint64_t batch;     ///< Number of the workgroup, or of the batch.
+    // The last read of what nothing has written; set by the functions below.
+    const CheckSite* undefined_site;
+    const CheckedMemory* undefined_memory;
+    std::uint64_t undefined_lanes;
 };
 
 enum MemoryAccess : std::uint32_t {
@@ -52,16 +58,17 @@ extern "C" {
 using NacreCpuCheckBegin = void (*)(nacre::cpu::RunningInvocations*);
 /// A workgroup begins: its memory is undefined again. `bytes` of variables.
 using NacreCpuCheckWorkgroup = void (*)(const nacre::cpu::ShaderContext*, std::byte* memory, std::uint64_t bytes);
-/// A fault of the kind (rhi::ShaderFault) in these lanes. `found` and `limit` may be null.
+/// A fault of the kind (rhi::ShaderFault) in these lanes. `descriptor`, `found` and `limit` may be null.
 using NacreCpuCheckFault = void (*)(const nacre::cpu::RunningInvocations*, const nacre::cpu::CheckSite*, std::uint32_t kind,
-                                    std::uint32_t lanes, const std::int64_t* found, const std::int64_t* limit);
+                                    std::uint32_t lanes, const nacre::cpu::Descriptor* descriptor,
+                                    const std::int64_t* found, const std::int64_t* limit);
 /// An access to memory; returns the lanes that read what is undefined. `undefined`: lanes that write what is.
-using NacreCpuCheckMemory = std::uint32_t (*)(const nacre::cpu::RunningInvocations*, const nacre::cpu::CheckSite*,
+using NacreCpuCheckMemory = std::uint32_t (*)(nacre::cpu::RunningInvocations*, const nacre::cpu::CheckSite*,
                                               const nacre::cpu::Descriptor* const* descriptors, std::byte* const* addresses,
                                               std::uint32_t bytes, std::uint32_t access, std::uint32_t lanes,
                                               std::uint32_t undefined);
 /// An access to an image, before it is made; returns the lanes that read what is undefined.
-using NacreCpuCheckImage = std::uint32_t (*)(const nacre::cpu::RunningInvocations*, const nacre::cpu::CheckSite*,
+using NacreCpuCheckImage = std::uint32_t (*)(nacre::cpu::RunningInvocations*, const nacre::cpu::CheckSite*,
                                              const nacre::cpu::Descriptor* image, const nacre::cpu::Descriptor* sampler,
                                              nacre::cpu::ImageArguments*, std::uint32_t flags, std::uint32_t lanes);
 }

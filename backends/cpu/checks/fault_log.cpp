@@ -27,8 +27,10 @@ const char* remedy_of(rhi::ShaderFault kind) {
 }  // namespace
 
 void FaultLog::add(rhi::ShaderFault kind, const void* key, const std::string& object, std::uint32_t count,
-                   const std::function<FoundFault()>& describe) {
+                   bool stops, const std::function<FoundFault()>& describe) {
     const std::scoped_lock lock(mutex_);
+    // Whatever follows may be its consequence.
+    if (stop_ != ~std::size_t{0} && !known_.contains({kind, key, object})) return;
     const auto [at, is_new] = known_.try_emplace({kind, key, object}, entries_.size());
     if (!is_new) {
         entries_[at->second].fault.count += count;
@@ -37,6 +39,7 @@ void FaultLog::add(rhi::ShaderFault kind, const void* key, const std::string& ob
     FoundFault fault = describe();
     fault.kind = kind;
     fault.count = count;
+    if (stops && stop_ == ~std::size_t{0}) stop_ = entries_.size();
     entries_.push_back({std::move(fault)});
 }
 
@@ -65,9 +68,9 @@ void FaultLog::send() {
     for (const rhi::Message& message : messages) report_(message);
 }
 
-std::string FaultLog::first() const {
+std::string FaultLog::stop() const {
     const std::scoped_lock lock(mutex_);
-    return entries_.empty() ? std::string() : text_of(entries_.front().fault);
+    return stop_ < entries_.size() ? text_of(entries_[stop_].fault) : std::string();
 }
 
 }  // namespace nacre::cpu

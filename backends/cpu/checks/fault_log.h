@@ -35,12 +35,13 @@ class FaultLog {
 
     /// Takes note of a fault. `key` names its place: of several with one key and kind the first is kept, and the others
     /// are counted. `describe` is called for the first only.
-    void add(rhi::ShaderFault kind, const void* key, const std::string& object, std::uint32_t count,
+    /// @param stops  the device is given up because of it
+    void add(rhi::ShaderFault kind, const void* key, const std::string& object, std::uint32_t count, bool stops,
              const std::function<FoundFault()>& describe);
     /// Gives what was added since the last call as messages, those of the order in which they came.
     void send();
-    /// What the first fault says; empty: there was none.
-    [[nodiscard]] std::string first() const;
+    /// What the first fault says that stops the device; empty: none does.
+    [[nodiscard]] std::string stop() const;
 
   private:
     struct Entry {
@@ -51,6 +52,7 @@ class FaultLog {
     const std::function<void(const rhi::Message&)> report_;
     mutable std::mutex mutex_;
     std::vector<Entry> entries_;
+    std::size_t stop_ = ~std::size_t{0};  ///< Into entries_.
     std::map<std::tuple<rhi::ShaderFault, const void*, std::string>, std::size_t> known_;
 };
 

@@ -128,6 +128,7 @@ void Emitter::begin_checks(rhi::ShaderStage stage, llvm::Value* work, llvm::Valu
     put(offsetof(RunningInvocations, subgroup), subgroup ? subgroup : int32(0));
     for (std::size_t i = 0; i < 3; ++i) put(offsetof(RunningInvocations, size) + i * 4, int32(module.workgroup_size[i]));
     put(offsetof(RunningInvocations, barriers), int32(0));
+    put(offsetof(RunningInvocations, undefined_site), llvm::ConstantPointerNull::get(pointer_type));
     if (stage != rhi::ShaderStage::compute) {
         builder.CreateCall(external("nacre_cpu_check_begin", builder.getVoidTy(), {pointer_type}), {all.running});
         return;
@@ -158,7 +159,8 @@ void Emitter::check_barrier() {
 
 // ---- Faults -----------------------------------------------------------------------------------------------------
 
-void Emitter::check_fault(ShaderFault kind, llvm::Value* bad, const std::string& object, const Component& found, const Component& limit) {
+void Emitter::check_fault(ShaderFault kind, llvm::Value* bad, const std::string& object, const Component& found, const Component& limit,
+                          const Pointer* pointer) {
     if (const auto* never = llvm::dyn_cast<llvm::Constant>(bad); never && never->isNullValue()) return;
     CheckNotes& all = notes();
     llvm::Value* bits = mask_bits(both(effect_mask(), bad));
@@ -175,9 +177,16 @@ void Emitter::check_fault(ShaderFault kind, llvm::Value* bad, const std::string&
     };
     llvm::Value* found_values = put(found, all.found);
     llvm::Value* limit_values = put(limit, all.limit);
+    llvm::Value* descriptor_at = llvm::ConstantPointerNull::get(pointer_type);
+    std::int32_t set = -1, binding = -1;
+    if (pointer && pointer->descriptor_address) {
+        set = static_cast<std::int32_t>(pointer->set), binding = static_cast<std::int32_t>(pointer->binding);
+        if (pointer->descriptor_address.is_uniform()) descriptor_at = pointer->descriptor_address.value;
+    }
     builder.CreateCall(external("nacre_cpu_check_fault", builder.getVoidTy(),
-                                {pointer_type, pointer_type, builder.getInt32Ty(), builder.getInt32Ty(), pointer_type, pointer_type}),
-                       {all.running, check_site(object, -1, -1), int32(static_cast<std::int32_t>(kind)), bits, found_values, limit_values});
+                                {pointer_type, pointer_type, builder.getInt32Ty(), builder.getInt32Ty(), pointer_type, pointer_type, pointer_type}),
+                       {all.running, check_site(object, set, binding), int32(static_cast<std::int32_t>(kind)), bits, descriptor_at, found_values,
+                        limit_values});
     builder.CreateBr(after);
     builder.SetInsertPoint(after);
 }
@@ -270,15 +279,15 @@ void Emitter::check_result(const Instruction& at) {
     check_fault(ShaderFault::infinity, builder.CreateAnd(result.infinite, was_finite), {});
 }
 
-void Emitter::check_index(const Component& index, const Component& bound, const std::string& object) {
+void Emitter::check_index(const Component& index, const Component& bound, const std::string& object, const Pointer* pointer) {
     if (!looks_for(check_traps | check_sanitize)) return;
     llvm::Value *at = widen(index), *end = widen(bound);
-    check_fault(ShaderFault::index_range, builder.CreateICmpUGE(at, end), object, index, bound);
+    check_fault(ShaderFault::index_range, builder.CreateICmpUGE(at, end), object, index, bound, pointer);
 }
 
 void Emitter::check_range(const Pointer& pointer) {
     if (!looks_for(check_traps | check_sanitize)) return;
-    for (const Pointer::Index& at : pointer.indices) check_index(at.index, at.bound, pointer.path);
+    for (const Pointer::Index& at : pointer.indices) check_index(at.index, at.bound, pointer.path, &pointer);
     if (pointer.kind != Pointer::Kind::bytes || !pointer.needs_limit_check) return;
     std::int64_t bytes = 0;
     visit_layout(pointer, pointer.type, 0, [&](const Pointer&, std::int64_t extra, const Type& scalar) {
@@ -294,7 +303,7 @@ void Emitter::check_range(const Pointer& pointer) {
         return builder.CreateAdd(v[0], llvm::ConstantInt::getSigned(v[0]->getType(), pointer.offset + bytes - 1));
     })
                                                   : Component(int64(pointer.offset + bytes - 1));
-    check_fault(ShaderFault::index_range, bad, pointer.path + ", counted in bytes", last, pointer.limit);
+    check_fault(ShaderFault::index_range, bad, pointer.path + ", counted in bytes", last, pointer.limit, &pointer);
 }
 
 void Emitter::check_quads() {

@@ -268,7 +268,7 @@ class Emitter {
     void check_result(const Instruction& at);
     /// Indices on the way of a pointer, and the whole value that it leads to.
     void check_range(const Pointer& pointer);
-    void check_index(const Component& index, const Component& bound, const std::string& object);
+    void check_index(const Component& index, const Component& bound, const std::string& object, const Pointer* pointer = nullptr);
     void check_undefined(std::span<const Component> components, const std::string& object);
     /// Every quad in which some but not all lanes run.
     void check_quads();
@@ -299,7 +299,7 @@ class Emitter {
     CheckNotes& notes();
     llvm::Value* check_site(const std::string& object, std::int32_t set, std::int32_t binding);
     void check_fault(rhi::ShaderFault kind, llvm::Value* bad, const std::string& object, const Component& found = {},
-                     const Component& limit = {});
+                     const Component& limit = {}, const Pointer* pointer = nullptr);
     std::shared_ptr<CheckNotes> check_notes;
 
     // ---- Stages: what only they know.
