@@ -373,12 +373,11 @@ void CommandList::pop_debug_group() {
 void CommandList::begin_statement(std::string_view pass, std::span<const StatedAccess> accesses) {
     NACRE_RECORD_IF_VALID(begin_statement());
     const std::uint32_t name = add_string(*stream_, pass);
-    auto& command = stream_->append<BeginStatementCommand>(accesses.size() * sizeof(StatedAccessCommand));
+    auto& command = stream_->append<BeginStatementCommand>(accesses.size_bytes());
     command.name = name;
     command.count = static_cast<std::uint32_t>(accesses.size());
-    for (std::size_t i = 0; i < accesses.size(); ++i)
-        new (command.accesses() + i) StatedAccessCommand{accesses[i].buffer, accesses[i].texture,
-                                                         accesses[i].acceleration_structure, accesses[i].use};
+    if (!accesses.empty())
+        std::memcpy(reinterpret_cast<std::byte*>(&command + 1), accesses.data(), accesses.size_bytes());
 }
 
 void CommandList::end_statement() {

@@ -246,21 +246,11 @@ struct PushDebugGroupCommand {
     std::uint32_t name;  ///< Index into CommandStream::strings.
 };
 struct PopDebugGroupCommand { static constexpr CommandType type = CommandType::pop_debug_group; };
-/// A StatedAccess; objects are null where it names another kind, or where the resource was destroyed.
-struct StatedAccessCommand {
-    BufferReference buffer;
-    TextureReference texture;
-    AccelerationStructureReference acceleration_structure;
-    ResourceUse use;
-};
-/// Followed by `count` StatedAccessCommand. Nothing that backends do depends on them, but they may check them.
+/// Followed by `count` StatedAccess. Backends skip both.
 struct BeginStatementCommand {
     static constexpr CommandType type = CommandType::begin_statement;
     std::uint32_t name, count;
-    [[nodiscard]] StatedAccessCommand* accesses() { return reinterpret_cast<StatedAccessCommand*>(this + 1); }
-    [[nodiscard]] const StatedAccessCommand* accesses() const {
-        return reinterpret_cast<const StatedAccessCommand*>(this + 1);
-    }
+    [[nodiscard]] const StatedAccess* accesses() const { return reinterpret_cast<const StatedAccess*>(this + 1); }
 };
 struct EndStatementCommand { static constexpr CommandType type = CommandType::end_statement; };
 

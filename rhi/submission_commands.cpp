@@ -309,22 +309,10 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
                               "Statements stand around render passes and are not nested.");
             in_statement_ = true;
             statement_name_ = stream_->strings[command.name];
-            stated_.clear();
+            stated_.assign(command.accesses(), command.accesses() + command.count);
             actual_.clear();
-            for (StatedAccessCommand& access : std::span(command.accesses(), command.count)) {
-                stated_.push_back({.buffer = access.buffer.handle,
-                                   .texture = access.texture.handle,
-                                   .use = access.use,
-                                   .acceleration_structure = access.acceleration_structure.handle});
-                // What was destroyed is an error of the commands that use it, if any does.
-                const BufferObject* buffer = tables_.buffers.find(access.buffer.handle);
-                access.buffer.object = buffer ? buffer->backend.get() : nullptr;
-                const TextureObject* texture = tables_.textures.find(access.texture.handle);
-                access.texture.object = texture ? texture->backend.get() : nullptr;
-                const AccelerationStructureObject* structure =
-                    tables_.acceleration_structures.find(access.acceleration_structure.handle);
-                access.acceleration_structure.object = structure ? structure->backend.get() : nullptr;
-            }
+            used_objects_.clear();
+            statement_ = &header;
             return {};
         }
         case CommandType::end_statement:

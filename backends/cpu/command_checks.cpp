@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstring>
 #include <functional>
 
 #include <fmt/format.h>
 
 #include "backends/cpu/commands.h"
+#include "rhi/state_tracker.h"
 
 /// @file
 /// What checks must know of commands: their names, and which content they have defined.
@@ -122,6 +124,56 @@ void Executor::note_name(const rhi::CommandHeader& header, const std::byte* payl
     if (header.type == CommandType::pop_debug_group && !debug_groups_.empty()) debug_groups_.pop_back();
     if (header.type == CommandType::begin_render_pass)
         pass_name_ = string_at(reinterpret_cast<const rhi::BeginRenderPassCommand*>(payload)->name);
+}
+
+void Executor::begin_statement(const rhi::CommandHeader& header, const std::byte* payload) {
+    const auto at = static_cast<std::size_t>(reinterpret_cast<const std::uint64_t*>(&header) - plan_->words.data());
+    const FlatPlan::ListNames& list = plan_->lists.at(list_ - 1);
+    const std::string name = list.strings.at(reinterpret_cast<const rhi::BeginStatementCommand*>(payload)->name);
+    for (const FlatPlan::Unstated& use : plan_->unstated) {
+        CheckedMemory* memory = use.buffer ? use.buffer->checked.get() : use.texture ? use.texture->checked.get() : nullptr;
+        if (use.statement != at || !memory || !(checks_.flags & check_hostile)) continue;
+        checks_.log->add(rhi::ShaderFault::unstated_access, nullptr, name + memory->name(), 1, false, [&] {
+            FoundFault fault;
+            fault.attempted = "run pass";
+            fault.subject = fmt::format("'{}' of list '{}', {}", name, list.name, memory->name());
+            fault.reason = fmt::format("expected uses that its statement names ({}), found {}", rhi::text_of(use.stated),
+                                       rhi::text_of(use.found & ~use.stated));
+            return fault;
+        });
+        Withheld& withheld = withheld_.emplace_back();
+        withheld.memory = memory;
+        withheld.content.assign(memory->data(), memory->data() + memory->size());
+        withheld.undefined = memory->undefined_bytes();
+        withheld.is_poisoned = rhi::has_any(use.found & ~use.stated, ~rhi::writing_uses);
+        withheld.keeps_writes = rhi::has_any(use.stated, rhi::writing_uses);
+        if (!withheld.is_poisoned) continue;
+        poison(memory->data(), memory->size());
+        memory->define(0, memory->size(), false);
+    }
+}
+
+void Executor::end_statement() {
+    for (Withheld& withheld : withheld_) {
+        CheckedMemory& memory = *withheld.memory;
+        if (!withheld.keeps_writes) {
+            std::memcpy(memory.data(), withheld.content.data(), withheld.content.size());
+            memory.restore(std::move(withheld.undefined));
+            continue;
+        }
+        // What the commands have not written is as before.
+        std::vector<std::uint64_t> undefined = memory.undefined_bytes();
+        for (std::uint64_t at = 0; at < memory.size(); at += 4) {
+            const std::uint64_t count = std::min<std::uint64_t>(4, memory.size() - at);
+            const std::uint32_t word = poison_word(at / 4);
+            if (!withheld.is_poisoned || std::memcmp(memory.data() + at, &word, count) != 0) continue;
+            std::memcpy(memory.data() + at, withheld.content.data() + at, count);
+            const std::uint64_t bits = std::uint64_t{15} << at % 64;
+            undefined[at / 64] = (undefined[at / 64] & ~bits) | (withheld.undefined[at / 64] & bits);
+        }
+        memory.restore(std::move(undefined));
+    }
+    withheld_.clear();
 }
 
 void Executor::note_transfer(const rhi::CommandHeader& header, const std::byte* payload) {

@@ -39,12 +39,18 @@ FlatPlan flatten(const rhi::ExecutionPlan& plan, bool for_checks) {
         for (const auto& block : stream->blocks) total += block.used;
     }
     flat.words.reserve(total / 8);
+    flat.host_buffers.assign(plan.host_buffers.begin(), plan.host_buffers.end());
     for (rhi::CommandStream* stream : plan.streams) {
         const CommandHeader begin{static_cast<CommandType>(begin_list_command), 0, sizeof(CommandHeader)};
         append(flat, &begin, sizeof begin);
         if (for_checks) flat.lists.push_back({stream->name, stream->strings});
         stream->for_each([&](const CommandHeader& header, const std::byte*) {
-            if (for_checks || is_executed(header.type)) append(flat, &header, header.bytes);
+            if (!for_checks && !is_executed(header.type)) return;
+            for (const rhi::UnstatedUse& use : plan.unstated)
+                if (use.statement == &header)
+                    flat.unstated.push_back({flat.words.size(), static_cast<CpuBuffer*>(use.buffer),
+                                             static_cast<CpuTexture*>(use.texture), use.stated, use.found});
+            append(flat, &header, header.bytes);
         });
     }
     return flat;
@@ -77,6 +83,7 @@ std::string Executor::execute(const FlatPlan& plan) {
         in_pass_ = false;
     }
     reset_state();
+    end_statement();
     forget_checks();
     if (checks_.log) checks_.log->send();
     plan_ = nullptr;
@@ -179,10 +186,10 @@ void Executor::execute(const CommandHeader& header, const std::byte* payload) {
             return begin_occlusion_query(pool_of(command), command.index);
         }
         case CommandType::end_occlusion_query: return end_occlusion_query();
+        case CommandType::begin_statement: return begin_statement(header, payload);
+        case CommandType::end_statement: return end_statement();
         case CommandType::push_debug_group:
-        case CommandType::pop_debug_group:
-        case CommandType::begin_statement:
-        case CommandType::end_statement: return;
+        case CommandType::pop_debug_group: return;
     }
 #undef NACRE_COMMAND
 }

@@ -32,6 +32,15 @@ struct FlatPlan {
         std::vector<std::string> strings;
     };
     std::vector<ListNames> lists;
+    /// Uses that a statement does not name (see rhi::UnstatedUse).
+    struct Unstated {
+        std::size_t statement = 0;  ///< Where the command that begins it lies in `words`.
+        CpuBuffer* buffer = nullptr;
+        CpuTexture* texture = nullptr;
+        rhi::ResourceUse stated{}, found{};
+    };
+    std::vector<Unstated> unstated;
+    std::vector<const rhi::BackendBuffer*> host_buffers;  ///< In use that the host can map.
 };
 inline constexpr std::uint16_t begin_list_command = 0xffff;
 
@@ -86,6 +95,10 @@ class Executor {
     void note_pass_begin(const rhi::BeginRenderPassCommand& command);
     void note_pass_end();
     void prepare_workgroup_checks();
+    /// What a statement does not name is kept from its commands: nothing makes them wait for it, so in the worst order they
+    /// find undefined content, and what they write is overwritten.
+    void begin_statement(const rhi::CommandHeader& header, const std::byte* payload);
+    void end_statement();
 
     /// Notes which shader ran when the watchdog's limit passed.
     void look_at_watchdog(const std::string& shader);
@@ -149,6 +162,14 @@ class Executor {
         bool is_depth = false, is_discarded = false, is_stencil_discarded = false;
     };
     std::vector<Attachment> attachments_;  ///< Of the open pass, where there are checks.
+    /// Content that is kept from the commands of the open statement.
+    struct Withheld {
+        CheckedMemory* memory = nullptr;
+        std::vector<std::byte> content;
+        std::vector<std::uint64_t> undefined;
+        bool is_poisoned = false, keeps_writes = false;
+    };
+    std::vector<Withheld> withheld_;
 
     std::vector<MemoryBlock> workgroup_memory_;  ///< One for each thread.
     std::shared_ptr<HostMemory> scratch_;

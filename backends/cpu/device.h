@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -34,6 +35,7 @@ class CpuDevice : public rhi::BackendDevice {
 
     [[nodiscard]] const rhi::AdapterInfo& adapter() const override { return adapter_; }
     [[nodiscard]] const rhi::Capabilities& capabilities() const override { return capabilities_; }
+    [[nodiscard]] bool wants_uses() const override { return is_hostile(); }
 
     Expected<std::unique_ptr<rhi::BackendBuffer>> create_buffer(const rhi::BufferDesc& desc) override;
     Expected<std::unique_ptr<rhi::BackendTexture>> create_texture(const rhi::TextureDesc& desc) override;
@@ -70,6 +72,15 @@ class CpuDevice : public rhi::BackendDevice {
     /// which may destroy them as soon as it hears of the loss: only called where the queue runs nothing.
     void lose(const std::string& reason);
     void run_plan(const FlatPlan& plan);
+
+    // Hostile order: work is done as late as is allowed, so that who does not wait for it does not find it done.
+    [[nodiscard]] bool is_hostile() const { return (checks_ & check_hostile) != 0; }
+    /// Hands the plans up to a serial to the queue.
+    void release(std::uint64_t serial);
+    /// Reports that the host uses a buffer which a plan that waits uses too.
+    void check_host_access(const char* attempted, const rhi::BackendBuffer& buffer);
+    std::deque<FlatPlan> waiting_;       // Under mutex_.
+    std::uint32_t questions_ = 0;        // Under mutex_: for completion, since the last plan.
 
     rhi::AdapterInfo adapter_;
     rhi::Capabilities capabilities_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
+#include <numeric>
 #include <optional>
 
 #include "backends/cpu/capabilities.h"
@@ -29,6 +30,23 @@ std::optional<Arguments> read_arguments(const rhi::BufferReference& reference, s
 std::uint64_t share(std::uint64_t total, std::uint64_t part, std::uint64_t parts) {
     return total / parts * part + total % parts * part / parts;
 }
+
+/// Puts the numbers below a total into another order, always the same for one seed.
+class Shuffle {
+  public:
+    Shuffle(std::uint64_t total, std::uint32_t seed) : total_(total) {
+        if (total >> 32) return;  // Backwards is order enough, and products stay in range.
+        // Steps of about a golden part of the whole, which have no factor in common with it: neighbors come far apart.
+        step_ = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(static_cast<double>(total) * 0.6180339887) + seed) % total;
+        while (std::gcd(step_, total) != 1) ++step_;
+    }
+    std::uint64_t operator()(std::uint64_t index) const {
+        return total_ - 1 - index * step_ % total_;
+    }
+
+  private:
+    std::uint64_t total_, step_ = 1;
+};
 
 }  // namespace
 
@@ -159,6 +177,9 @@ void Executor::dispatch(rhi::DispatchArguments groups) {
         prepare_workgroup_checks();
         context.checks = make_checks("dispatch", ++dispatches_);
     }
+    // Hostile order: workgroups one by one, in an order that nobody can rely on.
+    const bool is_shuffled = (checks_.flags & check_hostile) != 0;
+    const Shuffle shuffle(total, checks_.seed);
     // Enough parts that threads finish together; neighbors stay together for the sake of caches.
     constexpr std::uint64_t parts_for_each_thread = 32;
     const auto parts =
@@ -171,11 +192,13 @@ void Executor::dispatch(rhi::DispatchArguments groups) {
             constexpr std::uint64_t most_at_once = 1024;
             for (std::uint64_t at = share(total, part, parts); at < end && !watchdog_.has_expired();) {
                 WorkgroupRange range{};
-                range.x_begin = static_cast<std::uint32_t>(at % groups.x);
-                const std::uint64_t count = std::min({end - at, std::uint64_t{groups.x} - range.x_begin, most_at_once});
+                const std::uint64_t first = is_shuffled ? shuffle(at) : at;
+                range.x_begin = static_cast<std::uint32_t>(first % groups.x);
+                const std::uint64_t count =
+                    is_shuffled ? 1 : std::min({end - at, std::uint64_t{groups.x} - range.x_begin, most_at_once});
                 range.x_end = range.x_begin + static_cast<std::uint32_t>(count);
-                range.y = static_cast<std::uint32_t>(at / groups.x % groups.y);
-                range.z = static_cast<std::uint32_t>(at / groups.x / groups.y);
+                range.y = static_cast<std::uint32_t>(first / groups.x % groups.y);
+                range.z = static_cast<std::uint32_t>(first / groups.x / groups.y);
                 range.count[0] = groups.x, range.count[1] = groups.y, range.count[2] = groups.z;
                 range.memory = workgroup_memory_[thread].data();
                 program.run(&context, &range);

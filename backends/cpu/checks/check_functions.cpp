@@ -54,12 +54,20 @@ std::string object_text(const CheckSite& site, const CheckedMemory* memory) {
 }
 
 void add_fault(const RunningInvocations& running, const CheckSite& site, ShaderFault kind, std::uint32_t lanes,
-               const CheckedMemory* memory, const std::function<std::string(std::uint32_t lane)>& reason) {
+               const CheckedMemory* memory, const std::function<std::string(std::uint32_t lane)>& reason,
+               const CheckSite* other = nullptr) {
     const CommandChecks& checks = *running.context->checks;
     using enum ShaderFault;
     const bool stops = (checks.flags & check_traps) &&
                        (kind == not_a_number || kind == infinity || kind == division_by_zero || kind == index_range);
-    checks.log->add(kind, &site, memory ? memory->name() : std::string(),
+    // Of two places that are one fault the first found speaks for both.
+    const CheckSite* key = &site;
+    std::string object = memory ? memory->name() : std::string();
+    if (other) {
+        object += fmt::format(" {}", static_cast<const void*>(std::max(key, other)));
+        key = std::min(key, other);
+    }
+    checks.log->add(kind, key, object,
                     static_cast<std::uint32_t>(std::popcount(lanes)), stops, [&] {
                         const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
                         FoundFault fault;
@@ -156,7 +164,7 @@ void note_race(const RunningInvocations& running, const CheckSite& site, const A
                 return fmt::format("expected one invocation to use byte {} of {} at a time, found another at {}", at.offset,
                                    object.empty() ? "the workgroup's memory" : object,
                                    other->site && other->site->place ? other->site->place : "an unknown line");
-            });
+            }, other->site);
             return;
         }
         done += count;

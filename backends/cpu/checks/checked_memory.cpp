@@ -82,6 +82,11 @@ void CheckedMemory::copy_definedness(std::uint64_t offset, const CheckedMemory& 
     }
 }
 
+void CheckedMemory::restore(std::vector<std::uint64_t> undefined_bytes) {
+    undefined_ = std::move(undefined_bytes);
+    has_undefined_ = std::ranges::any_of(undefined_, [](std::uint64_t bits) { return bits != 0; });
+}
+
 void CheckedMemory::Free::operator()(Word* words) const { std::free(words); }
 
 CheckedMemory::Word* CheckedMemory::words() {

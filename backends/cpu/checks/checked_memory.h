@@ -51,6 +51,10 @@ class CheckedMemory {
     /// Takes over from other memory what is defined there.
     void copy_definedness(std::uint64_t offset, const CheckedMemory& from, std::uint64_t from_offset, std::uint64_t bytes);
 
+    /// Which bytes are undefined, one bit for each; for `restore`. Not while shaders run.
+    [[nodiscard]] const std::vector<std::uint64_t>& undefined_bytes() const { return undefined_; }
+    void restore(std::vector<std::uint64_t> undefined_bytes);
+
     /// Takes note of a use of the word at `offset`; returns an earlier use that it races with.
     std::optional<WordUse> note_use(std::uint64_t offset, bool writes, const WordUse& use);
 
@@ -67,7 +71,7 @@ class CheckedMemory {
     std::byte* const data_;
     const std::uint64_t size_;
     std::atomic<bool> has_undefined_;
-    std::vector<std::uint64_t> undefined_;  ///< One bit for each byte; empty until the first is undefined.
+    std::vector<std::uint64_t> undefined_;  ///< One bit for each byte.
     std::atomic<Word*> words_{nullptr};
     std::unique_ptr<Word[], Free> owned_words_;
 };

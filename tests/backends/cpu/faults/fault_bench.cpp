@@ -43,9 +43,11 @@ FaultBench::FaultBench(const std::string& backend) {
         const std::scoped_lock lock(mutex_);
         messages_.push_back(message);
     });
+    constexpr rhi::BufferUsage buffer_usage =
+        rhi::BufferUsage::storage | rhi::BufferUsage::copy_source | rhi::BufferUsage::copy_destination;
     using enum rhi::TextureUsage;
-    output = ok(device_->create_buffer({.size = 1024, .usage = rhi::BufferUsage::storage, .name = "output"}));
-    input = ok(device_->create_buffer({.size = 256, .usage = rhi::BufferUsage::storage, .name = "input"}));
+    output = ok(device_->create_buffer({.size = 1024, .usage = buffer_usage, .name = "output"}));
+    input = ok(device_->create_buffer({.size = 256, .usage = buffer_usage, .name = "input"}));
     const rhi::TextureDesc words{.format = rhi::Format::r32_uint, .width = 8, .height = 8,
                                  .usage = storage | sampled | copy_destination | copy_source, .name = "picture"};
     picture = ok(device_->create_texture(words));
@@ -79,6 +81,7 @@ rhi::BindGroup FaultBench::bind(rhi::BindGroupLayout layout) {
         if (binding.binding == 1) entry.buffer = input;
         if (binding.binding == 2) entry.texture = rhi::TextureView{picture};
         if (binding.binding == 3) entry.texture = rhi::TextureView{numbers};
+        if (binding.binding == 5) entry.texture = rhi::TextureView{target}, entry.sampler = nearest;
         if (binding.binding == 4) entry.sampler = nearest;
         group.entries.push_back(entry);
     }

@@ -3,7 +3,10 @@
 // be reported of shaders without any.
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <cstring>
 #include <ostream>
+#include <thread>
 
 #include "tests/backends/cpu/faults/fault_bench.h"
 
@@ -24,8 +27,6 @@ struct PlantedFault {
     std::uint32_t groups = 1;
 };
 void PrintTo(const PlantedFault& fault, std::ostream* out) { *out << fault.name; }
-
-constexpr const char* output_block = "layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;\n";
 
 const PlantedFault planted[] = {
     {"TrapNotANumber", "traps", "nan.comp", R"(layout(local_size_x = 8) in;
@@ -175,6 +176,192 @@ TEST_P(Planted, IsReported) {
         EXPECT_EQ(outcome.error().code, ErrorCode::device_lost);
         EXPECT_THAT(outcome.error().message(), HasSubstr(faulty_line(path, text)));
     }
+}
+
+// ---- Hostile order: faults that lie between commands, and the harm that they do every time. -----------------------
+
+constexpr const char* copy_text = R"(layout(local_size_x = 64) in;
+layout(set = 0, binding = 0) writeonly buffer Output { uint words[256]; } result;
+layout(set = 0, binding = 1) readonly buffer Input { uint words[64]; } numbers;
+void main() {
+    result.words[gl_GlobalInvocationID.x] = numbers.words[gl_GlobalInvocationID.x];
+})";
+
+const rhi::Message* find_message(const std::vector<rhi::Message>& messages, const std::string& code) {
+    for (const rhi::Message& message : messages)
+        if (message.code.starts_with(code)) return &message;
+    return nullptr;
+}
+
+std::vector<std::uint32_t> read_words(FaultBench& bench, rhi::Buffer buffer) {
+    const auto bytes = bench.device().read_buffer(buffer);
+    std::vector<std::uint32_t> words(bytes ? bytes->size() / 4 : 0);
+    if (bytes) std::memcpy(words.data(), bytes->data(), words.size() * 4);
+    return words;
+}
+
+/// Runs the copy under a statement.
+std::vector<std::uint32_t> copy_with_statement(FaultBench& bench, const std::vector<rhi::StatedAccess>& accesses) {
+    const rhi::ComputePipeline pipeline = bench.make_compute("copy.comp", copy_text);
+    rhi::CommandList list = bench.device().create_command_list("frame");
+    list.fill_buffer(bench.output, 7u);
+    list.begin_statement("copy", accesses);
+    list.set_pipeline(pipeline);
+    list.set_bind_group(0, bench.bind(pipeline));
+    list.dispatch({});
+    list.end_statement();
+    EXPECT_TRUE(bench.submit(std::move(list)));
+    return read_words(bench, bench.output);
+}
+
+TEST(CpuHostile, StatedUsesAreSilent) {
+    FaultBench bench("cpu:hostile");
+    const auto words = copy_with_statement(bench, {{.buffer = bench.input, .use = rhi::ResourceUse::storage_read},
+                                                   {.buffer = bench.output, .use = rhi::ResourceUse::storage_read |
+                                                                                   rhi::ResourceUse::storage_write}});
+    EXPECT_TRUE(bench.messages().empty());
+    EXPECT_EQ(words[5], 5u);
+    EXPECT_EQ(words[100], 7u);
+}
+
+TEST(CpuHostile, AReadThatIsNotStatedFindsUndefinedContent) {
+    FaultBench bench("cpu:hostile");
+    const auto words = copy_with_statement(
+        bench, {{.buffer = bench.output, .use = rhi::ResourceUse::storage_read | rhi::ResourceUse::storage_write}});
+    const auto messages = bench.messages();
+    const rhi::Message* unstated = find_message(messages, "N-821");
+    ASSERT_TRUE(unstated);
+    EXPECT_THAT(unstated->text, HasSubstr("buffer 'input'"));
+    EXPECT_THAT(unstated->text, HasSubstr("'copy' of list 'frame'"));
+    EXPECT_THAT(unstated->text, HasSubstr("storage_read"));
+    // The line that reads it is named too, and what it read is not what a lucky order gives.
+    const rhi::Message* read = find_message(messages, "N-805");
+    ASSERT_TRUE(read);
+    EXPECT_THAT(read->text, HasSubstr("copy.comp:5"));
+    EXPECT_THAT(read->text, HasSubstr("buffer 'input'"));
+    EXPECT_NE(words[5], 5u);
+    EXPECT_EQ(words[100], 7u);
+}
+
+TEST(CpuHostile, AWriteThatIsNotStatedIsLost) {
+    FaultBench bench("cpu:hostile");
+    const auto words = copy_with_statement(bench, {{.buffer = bench.input, .use = rhi::ResourceUse::storage_read},
+                                                   {.buffer = bench.output, .use = rhi::ResourceUse::storage_read}});
+    const auto messages = bench.messages();
+    ASSERT_EQ(messages.size(), 1u);
+    EXPECT_TRUE(messages[0].code.starts_with("N-821"));
+    EXPECT_THAT(messages[0].text, HasSubstr("buffer 'output'"));
+    EXPECT_EQ(words[5], 7u);
+}
+
+TEST(CpuHostile, NoOrderOfWorkgroupsIsReliedOn) {
+    // Each workgroup takes over from the one before it: right only where they run one after another.
+    const std::string text = R"(layout(local_size_x = 1) in;
+layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    result.words[i + 1u] = result.words[i] + 1u; // FAULT
+})";
+    for (const char* spec : {"cpu:hostile:threads=1", "cpu:hostile=7", "cpu:hostile:lanes=4"}) {
+        FaultBench bench(spec);
+        const rhi::ComputePipeline pipeline = bench.make_compute("chain.comp", text);
+        rhi::CommandList list = bench.device().create_command_list("once");
+        list.fill_buffer(bench.output, 0u);
+        list.set_pipeline(pipeline);
+        list.set_bind_group(0, bench.bind(pipeline));
+        list.dispatch({.x = 64});
+        ASSERT_TRUE(bench.submit(std::move(list)));
+        const auto messages = bench.messages();
+        ASSERT_FALSE(messages.empty());
+        EXPECT_TRUE(messages[0].code.starts_with("N-806"));
+        EXPECT_THAT(messages[0].text, HasSubstr(faulty_line("chain.comp", text)));
+        EXPECT_THAT(messages[0].text, HasSubstr("buffer 'output'"));
+        EXPECT_NE(read_words(bench, bench.output)[64], 64u);
+    }
+}
+
+TEST(CpuHostile, DiscardedContentIsPoison) {
+    FaultBench bench("cpu:hostile");
+    // Only a part of the target is written, and the rest was never cleared.
+    const std::string half = R"(layout(location = 0) out vec4 color;
+void main() {
+    if (gl_FragCoord.x > 4.0) discard;
+    color = vec4(0.5);
+})";
+    ASSERT_TRUE(bench.draw("half.frag", half, {}, rhi::LoadOperation::discard));
+    EXPECT_TRUE(bench.messages().empty());
+    const std::string text = R"(layout(local_size_x = 8, local_size_y = 8) in;
+layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
+layout(set = 0, binding = 5) uniform sampler2D target;
+void main() {
+    vec4 color = texelFetch(target, ivec2(gl_GlobalInvocationID.xy), 0);
+    result.words[gl_LocalInvocationIndex] = color.x > 0.25 ? 1u : 0u; // FAULT
+})";
+    ASSERT_TRUE(bench.compute("look.comp", text));
+    const auto messages = bench.messages();
+    ASSERT_EQ(messages.size(), 1u);
+    EXPECT_TRUE(messages[0].code.starts_with("N-805"));
+    EXPECT_THAT(messages[0].text, HasSubstr(faulty_line("look.comp", text)));
+    EXPECT_THAT(messages[0].text, HasSubstr("texture 'target'"));
+    EXPECT_THAT(messages[0].text, HasSubstr("invocation (4, 0, 0)"));
+}
+
+TEST(CpuHostile, ResultsAreThereOnlyForThoseWhoWait) {
+    FaultBench bench("cpu:hostile");
+    rhi::Device& device = bench.device();
+    const auto read_back = *device.create_buffer({.size = 256, .usage = rhi::BufferUsage::copy_destination,
+                                                  .memory = rhi::MemoryKind::readback, .name = "result"});
+    const auto copy = [&] {
+        rhi::CommandList list = device.create_command_list("copy");
+        list.copy_buffer(bench.input, 0, read_back, 0, 256);
+        return *device.submit(std::move(list));
+    };
+    const auto second_word = [&] {
+        const auto bytes = device.map(read_back);
+        std::uint32_t word = 0;
+        std::memcpy(&word, bytes->data() + 4, 4);
+        EXPECT_TRUE(device.unmap(read_back));
+        return word;
+    };
+    const rhi::Fence fence = copy();
+    EXPECT_NE(second_word(), 1u);
+    const auto messages = bench.messages();
+    ASSERT_EQ(messages.size(), 1u);
+    EXPECT_TRUE(messages[0].code.starts_with("N-820"));
+    EXPECT_THAT(messages[0].text, HasSubstr("'result'"));
+    ASSERT_TRUE(device.wait(fence));
+    EXPECT_EQ(second_word(), 1u);
+    EXPECT_EQ(bench.messages().size(), 1u);
+}
+
+TEST(CpuHostile, UploadMemoryIsNotWrittenWhileItIsRead) {
+    FaultBench bench("cpu:hostile");
+    rhi::Device& device = bench.device();
+    const auto upload = *device.create_buffer({.size = 256, .usage = rhi::BufferUsage::copy_source,
+                                               .memory = rhi::MemoryKind::upload, .name = "stream"});
+    const auto write = [&](std::uint32_t value) {
+        const auto bytes = device.map(upload);
+        for (std::size_t i = 0; i < 64; ++i) std::memcpy(bytes->data() + i * 4, &value, 4);
+        ASSERT_TRUE(device.unmap(upload));
+    };
+    write(11);
+    rhi::CommandList list = device.create_command_list("copy");
+    list.copy_buffer(upload, 0, bench.output, 0, 256);
+    const rhi::Fence fence = *device.submit(std::move(list));
+    write(22);
+    const auto messages = bench.messages();
+    ASSERT_EQ(messages.size(), 1u);
+    EXPECT_TRUE(messages[0].code.starts_with("N-820"));
+    EXPECT_THAT(messages[0].text, HasSubstr("'stream'"));
+    ASSERT_TRUE(device.wait(fence));
+    EXPECT_EQ(read_words(bench, bench.output)[0], 22u) << "the worst order lets the second write win";
+}
+
+TEST(CpuHostile, AskingAgainAndAgainIsAWayToWait) {
+    FaultBench bench("cpu:hostile");
+    const rhi::Fence fence = *bench.device().submit(bench.device().create_command_list("empty"));
+    for (int i = 0; i < 10000 && !bench.device().is_complete(fence); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    EXPECT_TRUE(bench.device().is_complete(fence));
 }
 
 }  // namespace
