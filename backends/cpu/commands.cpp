@@ -60,7 +60,8 @@ Executor::Executor(Scheduler& scheduler, Watchdog& watchdog, std::uint32_t lanes
     : scheduler_(scheduler),
       watchdog_(watchdog),
       transfer_(scheduler),
-      rasterizer_(scheduler, lanes),
+      rasterizer_(scheduler, lanes,
+                  {.tile_order = checks.flags & check_hostile ? std::optional(checks.seed) : std::nullopt}),
       checks_(checks),
       workgroup_memory_(scheduler.thread_count()),
       scratch_(std::make_shared<HostMemory>(machine_memory_bytes())) {

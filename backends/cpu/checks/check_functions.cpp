@@ -7,6 +7,7 @@
 #include <cstring>
 #include <optional>
 
+#include "backends/cpu/images/image_operations.h"
 #include "rhi/handle.h"
 
 namespace nacre::cpu {
@@ -249,18 +250,47 @@ TexelPlace find_texel(const ImageView& view, const ImageArguments& arguments, st
     return place;
 }
 
+/// Lanes of a filtered read in which an undefined texel has a share.
+std::uint32_t sample_undefined(const ImageView& view, CheckedMemory& memory, const Descriptor& sampler,
+                               ImageArguments& arguments, std::uint32_t flags, std::uint32_t lanes, std::uint32_t lane_count) {
+    if (!sampler.sampler || view.samples > 1) return 0;
+    const auto texels = memory.undefined_texels(view);
+    if (!texels) return 0;
+    SamplerState state = *sampler.sampler;
+    state.desc.border = rhi::BorderColor::transparent_black;
+    state.desc.comparison = false;
+    flags &= ~std::uint32_t{image_compare | image_integer | 3u << image_component_shift};
+    image_function(lane_count)(&texels->view, &state, &arguments, flags, lanes);
+    std::uint32_t undefined = 0;
+    for (std::uint32_t component = 0; component < 4; ++component) {
+        // Gathers give four texels; else the others are 0, and alpha is 1.
+        if (component != 0 && static_cast<ImageOperation>(flags & image_operation_mask) != ImageOperation::gather) break;
+        for (std::uint32_t lane = 0; lane < lane_count; ++lane)
+            if (std::bit_cast<float>(arguments.result[component][lane]) > 0.0f) undefined |= 1u << lane;
+    }
+    return undefined & lanes;
+}
+
 std::uint32_t image(RunningInvocations* running, const CheckSite* site, const Descriptor* descriptor,
-                    const Descriptor*, ImageArguments* arguments, std::uint32_t flags, std::uint32_t lanes) {
+                    const Descriptor* sampler, ImageArguments* arguments, std::uint32_t flags, std::uint32_t lanes) {
     const CommandChecks& checks = *running->context->checks;
     const ImageView* view = descriptor->image;
     const auto operation = static_cast<ImageOperation>(flags & image_operation_mask);
     using enum ImageOperation;
-    if (!view || (operation != fetch && operation != load && operation != store && operation != atomic)) return 0;
     auto* known = const_cast<CheckedMemory*>(object_of(checks, *running, site->set, descriptor));
+    if (!view) return 0;
+    if (operation == sample || operation == gather) {
+        if (!known || !(checks.flags & (check_sanitize | check_hostile))) return 0;
+        const std::uint32_t undefined =
+            sample_undefined(*view, *known, *sampler, *arguments, flags, lanes, running->lanes);
+        note_undefined(*running, *site, known, undefined);
+        return undefined;
+    }
     std::uint32_t access = access_read;
     if (operation != fetch) access |= access_shared;
     if (operation == store) access = access_write | access_shared;
     if (operation == atomic) access |= access_write | access_atomic;
+    if (flags & image_unshared) access &= ~std::uint32_t{access_shared};
     std::uint32_t read_undefined = 0;
     for (std::uint32_t rest = lanes; rest != 0; rest &= rest - 1) {
         const auto lane = static_cast<std::uint32_t>(std::countr_zero(rest));

@@ -50,6 +50,9 @@ enum MemoryAccess : std::uint32_t {
     access_workgroup = 16,  ///< Memory of the workgroup; no descriptors.
 };
 
+/// Beside ImageFlags: invocations agree on their own who uses a texel when.
+inline constexpr std::uint32_t image_unshared = 1u << 31;
+
 }  // namespace nacre::cpu
 
 // Functions that checked code calls. `lanes` has one bit for each lane that counts. Arrays have max_lanes elements.

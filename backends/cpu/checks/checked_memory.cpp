@@ -11,6 +11,8 @@
 namespace nacre::cpu {
 namespace {
 
+constexpr std::size_t readable_texels_behind = 16;
+
 /// Words are shared out over some locks: one for each would be more memory than the words themselves.
 class WordLock {
   public:
@@ -60,6 +62,7 @@ bool CheckedMemory::is_undefined(std::uint64_t offset, std::uint64_t bytes) cons
 void CheckedMemory::define(std::uint64_t offset, std::uint64_t bytes, bool is_defined) {
     if (is_defined && !has_undefined()) return;
     if (!is_defined) has_undefined_.store(true, std::memory_order_relaxed);
+    version_.fetch_add(1, std::memory_order_relaxed);
     for (std::uint64_t at = offset; at < offset + bytes && at < size_;) {
         const std::uint64_t first = at % 64, count = std::min(64 - first, offset + bytes - at);
         const std::uint64_t mask = (count == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1) << first;
@@ -84,7 +87,55 @@ void CheckedMemory::copy_definedness(std::uint64_t offset, const CheckedMemory& 
 
 void CheckedMemory::restore(std::vector<std::uint64_t> undefined_bytes) {
     undefined_ = std::move(undefined_bytes);
+    version_.fetch_add(1, std::memory_order_relaxed);
     has_undefined_ = std::ranges::any_of(undefined_, [](std::uint64_t bits) { return bits != 0; });
+}
+
+std::shared_ptr<const UndefinedTexels> CheckedMemory::undefined_texels(const ImageView& view) {
+    if (!has_undefined()) return nullptr;
+    const std::scoped_lock lock(texels_mutex_);
+    std::shared_ptr<const UndefinedTexels>& known = texels_[&view];
+    const std::uint64_t version = version_.load(std::memory_order_relaxed);
+    if (!known || known->version != version) {
+        auto made = std::make_shared<UndefinedTexels>();
+        made->version = version;
+        made->view = view;
+        made->view.format = rhi::Format::r32_float;
+        made->view.texel_bytes = 4;
+        made->view.word_texels = WordTexels::no;
+        made->view.stencil_levels = {};
+        std::uint64_t total = 0;
+        for (std::uint32_t mip = 0; mip < view.mip_count; ++mip) {
+            ImageLevel& level = made->view.levels[mip];
+            level.row_stride = level.width * 4;
+            level.slice_stride = std::uint64_t{level.row_stride} * level.height;
+            level.sample_stride = level.layer_stride = level.slice_stride * level.depth;
+            total += level.layer_stride * view.layer_count;
+        }
+        // Vectors of texels are read whole, up to the last.
+        made->numbers.resize(total / 4 + readable_texels_behind);
+        const std::uint32_t edge = rhi::info(view.format).block_width;
+        float* next = made->numbers.data();
+        for (std::uint32_t mip = 0; mip < view.mip_count; ++mip) {
+            const ImageLevel& from = view.levels[mip];
+            made->view.levels[mip].data = reinterpret_cast<std::byte*>(next);
+            for (std::uint32_t layer = 0; layer < view.layer_count; ++layer)
+                for (std::uint32_t z = 0; z < from.depth; ++z)
+                    for (std::uint32_t y = 0; y < from.height; ++y) {
+                        const std::byte* row = from.data + layer * from.layer_stride + z * from.slice_stride +
+                                               std::uint64_t{y / edge} * from.row_stride;
+                        const auto offset = offset_of(row);
+                        for (std::uint32_t x = 0; x < from.width; ++x, ++next) {
+                            const std::uint64_t texel = std::uint64_t{x / edge} * view.texel_bytes;
+                            if (!offset || !is_undefined(*offset + texel, view.texel_bytes)) continue;
+                            *next = 1.0f;
+                            made->has_any = true;
+                        }
+                    }
+        }
+        known = std::move(made);
+    }
+    return known->has_any ? known : nullptr;
 }
 
 void CheckedMemory::Free::operator()(Word* words) const { std::free(words); }

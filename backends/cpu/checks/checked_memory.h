@@ -4,7 +4,9 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +28,15 @@ struct WordUse {
     std::uint16_t barriers = 0;  ///< Workgroup barriers that it had passed.
     std::uint8_t bytes = 0;      ///< One bit for each byte of the word.
     bool is_atomic = false;
+};
+
+/// A view's texels as numbers: 1 where any byte is undefined, else 0. What sampling makes of them tells whether an undefined
+/// texel has a share in the result.
+struct UndefinedTexels {
+    ImageView view;
+    std::vector<float> numbers;
+    bool has_any = false;
+    std::uint64_t version = 0;
 };
 
 /// Thread-safe but for the constructor.
@@ -51,6 +62,9 @@ class CheckedMemory {
     /// Takes over from other memory what is defined there.
     void copy_definedness(std::uint64_t offset, const CheckedMemory& from, std::uint64_t from_offset, std::uint64_t bytes);
 
+    /// Of a view of this texture, as of now; null where nothing of it is undefined.
+    [[nodiscard]] std::shared_ptr<const UndefinedTexels> undefined_texels(const ImageView& view);
+
     /// Which bytes are undefined, one bit for each; for `restore`. Not while shaders run.
     [[nodiscard]] const std::vector<std::uint64_t>& undefined_bytes() const { return undefined_; }
     void restore(std::vector<std::uint64_t> undefined_bytes);
@@ -72,6 +86,9 @@ class CheckedMemory {
     const std::uint64_t size_;
     std::atomic<bool> has_undefined_;
     std::vector<std::uint64_t> undefined_;  ///< One bit for each byte.
+    std::atomic<std::uint64_t> version_{1};  ///< Rises with every change of `undefined_`.
+    std::mutex texels_mutex_;
+    std::map<const ImageView*, std::shared_ptr<const UndefinedTexels>> texels_;
     std::atomic<Word*> words_{nullptr};
     std::unique_ptr<Word[], Free> owned_words_;
 };

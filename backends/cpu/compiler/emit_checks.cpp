@@ -469,6 +469,7 @@ llvm::Value* Emitter::check_image(llvm::Value* image, llvm::Value* sampler, std:
     const auto operation = static_cast<ImageOperation>(flags & image_operation_mask);
     if (!variable || operation == ImageOperation::query_lod) return nullptr;
     llvm::Type* word = builder.getInt32Ty();
+    if (notes().coherent.contains(image_root) || notes().read_only.contains(image_root)) flags |= image_unshared;
     llvm::Value* counted = live_slot ? both(lanes_on, live()) : lanes_on;
     llvm::Value* bits = builder.CreateCall(
         external("nacre_cpu_check_image", word, {pointer_type, pointer_type, pointer_type, pointer_type, pointer_type, word, word}),

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -69,6 +70,7 @@ inline constexpr float largest_point_size = 255.0f;
 struct RasterizerOptions {
     std::uint32_t instruction_set = 2;  ///< At most: 0 the baseline of the processor family, 1 AVX2, 2 AVX-512.
     bool hierarchical_depth = true;
+    std::optional<std::uint32_t> tile_order;  ///< Seed: tiles are drawn in another order, one for each seed.
 };
 
 /// Carries out the draws of render passes, one after another, on the threads of a scheduler. Not thread-safe.

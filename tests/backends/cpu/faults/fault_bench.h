@@ -41,9 +41,10 @@ class FaultBench {
 
   private:
     rhi::Shader make_shader(const std::string& path, const std::string& text);
-    std::unique_ptr<rhi::Device> device_;
+    // Before the device, which may have something to say until its end.
     mutable std::mutex mutex_;
     std::vector<rhi::Message> messages_;
+    std::unique_ptr<rhi::Device> device_;
 };
 
 /// "PATH:LINE" of the line of a text that holds "FAULT".
