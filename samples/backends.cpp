@@ -20,16 +20,16 @@ std::vector<std::unique_ptr<rhi::Backend>> all_backends() {
     // OpenGL, unless they are told not to before they are loaded. Devices of their own do not look at this.
     setenv("GALLIVM_PERF", "no_quad_lod,no_aos_sampling,no_brilinear,no_rho_approx", 0);
     std::vector<std::unique_ptr<rhi::Backend>> backends;
+#ifdef NACRE_HAS_CPU
+    // First, so "auto" takes it: it works on every machine and needs no driver.
+    backends.push_back(cpu::make_backend());
+#endif
 #ifdef NACRE_HAS_VULKAN
     backends.push_back(vulkan::make_backend());
 #endif
 #ifdef NACRE_HAS_GL
     backends.push_back(gl::make_backend());
     backends.push_back(gl::make_es_backend());
-#endif
-#ifdef NACRE_HAS_CPU
-    // Works on every machine, so it comes first among the choices of "auto" once it can do all that the others can.
-    backends.push_back(cpu::make_backend());
 #endif
     return backends;
 }

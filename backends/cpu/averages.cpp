@@ -38,30 +38,52 @@ void add_weighted(std::span<LinearTexel> sum, std::span<const LinearTexel> texel
         for (std::size_t c = 0; c < 4; ++c) sum[x][c] += texels[x][c] * weight;
 }
 
-/// Makes one row of a mip of the up to four rows above it.
+/// In the middle, as everywhere where sizes are powers of two, by the operations of Mesa's software drivers; elsewhere without their
+/// loss of digits where b is much smaller than a.
+float between(float a, float b, float weight) {
+    return weight == 0.5f ? a + weight * (b - a) : a * (1.0f - weight) + b * weight;
+}
+
+/// The rows of the mip above that a row is made of: texels of the first and second row in the first and second slice.
+struct SourceRows {
+    const std::byte* texels[2][2];  // [slice][row]
+    float row_weight, slice_weight;
+};
+
+/// Makes one row of a mip of the up to four rows above it: interpolates along x, then y, then z, which is also the order of
+/// Mesa's software drivers, so that results have the same bits.
 class MipRow {
   public:
     MipRow(rhi::Format format, std::uint32_t texel_bytes, std::span<const Taps> columns)
         : format_(format), texel_bytes_(texel_bytes), columns_(columns) {}
 
-    /// @param rows  first texel of each row, with its weight
-    void make(std::span<const std::pair<const std::byte*, float>> rows, std::byte* out) {
+    void make(const SourceRows& rows, std::byte* out) {
         const auto width = static_cast<std::uint32_t>(columns_.size());
         for (std::uint32_t begin = 0; begin < width; begin += piece_texels) {
             const auto columns = columns_.subspan(begin, std::min(piece_texels, width - begin));
             const std::uint32_t from = columns.front().first;
             const std::uint32_t count = columns.back().second - from + 1;
-            const std::span sum(sum_.data(), count);
-            std::ranges::fill(sum, LinearTexel{});
-            for (const auto& [texels, weight] : rows) {
-                if (weight == 0.0f) continue;
+            const auto along_x = [&](const std::byte* texels, Piece& result) {
                 decode_row(format_, texels + std::size_t{from} * texel_bytes_, count, decoded_.data());
-                add_weighted(sum, decoded_, weight);
-            }
-            for (std::size_t x = 0; x < columns.size(); ++x) {
-                const LinearTexel &a = sum[columns[x].first - from], &b = sum[columns[x].second - from];
-                const float weight = columns[x].weight;
-                for (std::size_t c = 0; c < 4; ++c) result_[x][c] = a[c] * (1.0f - weight) + b[c] * weight;
+                for (std::size_t x = 0; x < columns.size(); ++x) {
+                    const LinearTexel &a = decoded_[columns[x].first - from], &b = decoded_[columns[x].second - from];
+                    for (std::size_t c = 0; c < 4; ++c) result[x][c] = between(a[c], b[c], columns[x].weight);
+                }
+            };
+            const auto blend = [&](Piece& first, const Piece& second, float weight) {
+                for (std::size_t x = 0; x < columns.size(); ++x)
+                    for (std::size_t c = 0; c < 4; ++c) first[x][c] = between(first[x][c], second[x][c], weight);
+            };
+            const auto slice = [&](std::size_t index, Piece& result) {
+                along_x(rows.texels[index][0], result);
+                if (rows.row_weight == 0.0f) return;
+                along_x(rows.texels[index][1], row_);
+                blend(result, row_, rows.row_weight);
+            };
+            slice(0, result_);
+            if (rows.slice_weight != 0.0f) {
+                slice(1, slice_);
+                blend(result_, slice_, rows.slice_weight);
             }
             encode_row(format_, result_.data(), static_cast<std::uint32_t>(columns.size()),
                        out + std::size_t{begin} * texel_bytes_);
@@ -69,11 +91,13 @@ class MipRow {
     }
 
   private:
+    using Piece = std::array<LinearTexel, piece_texels>;
+
     rhi::Format format_;
     std::uint32_t texel_bytes_;
     std::span<const Taps> columns_;
-    std::array<LinearTexel, source_piece_texels> sum_, decoded_;
-    std::array<LinearTexel, piece_texels> result_;
+    std::array<LinearTexel, source_piece_texels> decoded_;
+    Piece row_, slice_, result_;
 };
 
 }  // namespace
@@ -92,18 +116,14 @@ void Transfer::generate_mips(const ImageView& view) {
                 const auto z = static_cast<std::uint32_t>(at % layer_rows / to.height);
                 const auto y = static_cast<std::uint32_t>(at % to.height);
                 const Taps rows = taps_of(y, from.height, to.height), slices = taps_of(z, from.depth, to.depth);
-                const auto source = [&](std::uint32_t slice, std::uint32_t line, float weight) {
-                    return std::pair<const std::byte*, float>(from.data + layer * from.layer_stride +
-                                                                  slice * from.slice_stride +
-                                                                  std::uint64_t{line} * from.row_stride,
-                                                              weight);
+                const auto source = [&](std::uint32_t slice, std::uint32_t line) {
+                    return from.data + layer * from.layer_stride + slice * from.slice_stride +
+                           std::uint64_t{line} * from.row_stride;
                 };
-                const std::array sources{
-                    source(slices.first, rows.first, (1.0f - slices.weight) * (1.0f - rows.weight)),
-                    source(slices.first, rows.second, (1.0f - slices.weight) * rows.weight),
-                    source(slices.second, rows.first, slices.weight * (1.0f - rows.weight)),
-                    source(slices.second, rows.second, slices.weight * rows.weight)};
-                row.make(sources,
+                row.make({.texels = {{source(slices.first, rows.first), source(slices.first, rows.second)},
+                                     {source(slices.second, rows.first), source(slices.second, rows.second)}},
+                          .row_weight = rows.weight,
+                          .slice_weight = slices.weight},
                          to.data + layer * to.layer_stride + z * to.slice_stride + std::uint64_t{y} * to.row_stride);
             }
         });

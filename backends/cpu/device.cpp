@@ -54,7 +54,8 @@ rhi::AdapterInfo describe_machine() {
 
 CpuDevice::CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc& desc,
                      std::unique_ptr<Compiler> compiler)
-    : adapter_(describe_machine()),
+    : mode_(options.mode),
+      adapter_(describe_machine()),
       // Results must not depend on the lanes where arithmetic is consistent, so neither may the subgroup.
       capabilities_(find_capabilities(options.mode == ExecutionMode::consistent ? max_lanes : options.lanes)),
       faults_(desc.desc->faults),
@@ -110,7 +111,7 @@ Expected<std::unique_ptr<rhi::BackendTexture>> CpuDevice::create_texture(const r
 }
 Expected<std::unique_ptr<rhi::BackendSampler>> CpuDevice::create_sampler(const rhi::SamplerDesc& desc) {
     NACRE_CHECK(check_lost("create sampler"));
-    return std::make_unique<CpuSampler>(desc);
+    return std::make_unique<CpuSampler>(desc, mode_ == ExecutionMode::consistent);
 }
 Expected<std::unique_ptr<rhi::BackendShader>> CpuDevice::create_shader(const rhi::ShaderDesc& desc,
                                                                        const rhi::ShaderReflection& reflection) {

@@ -82,6 +82,7 @@ class CpuDevice : public rhi::BackendDevice {
     std::deque<FlatPlan> waiting_;       // Under mutex_.
     std::uint32_t questions_ = 0;        // Under mutex_: for completion, since the last plan.
 
+    ExecutionMode mode_;
     rhi::AdapterInfo adapter_;
     rhi::Capabilities capabilities_;
     rhi::FaultInjection faults_;

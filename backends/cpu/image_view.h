@@ -46,6 +46,9 @@ struct ImageView {
 /// A sampler, prepared.
 struct SamplerState {
     rhi::SamplerDesc desc;
+    /// Anisotropic footprints are ellipses, as in Mesa's software drivers; else several samples along the longer axis,
+    /// which costs less.
+    bool is_elliptical = false;
 };
 
 }  // namespace nacre::cpu

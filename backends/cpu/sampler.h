@@ -8,9 +8,9 @@ namespace nacre::cpu {
 
 class CpuSampler : public rhi::BackendSampler {
   public:
-    explicit CpuSampler(const rhi::SamplerDesc& sampler_desc) {
+    CpuSampler(const rhi::SamplerDesc& sampler_desc, bool is_elliptical) {
         desc = sampler_desc;
-        state.desc = sampler_desc;
+        state = {sampler_desc, is_elliptical};
     }
     SamplerState state;
 };

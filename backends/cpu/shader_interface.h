@@ -104,12 +104,16 @@ struct alignas(16) Plane {
 /// What fragment code reads of a triangle, line or point.
 ///
 /// For inputs with perspective the plane holds value / w, for noperspective inputs the value, for flat ones the bits of the
-/// provoking vertex's value in `c`. `inverse_w` is 1 / w; fragment code gets the value back as plane / inverse_w.
+/// provoking vertex's value in `c`. `inverse_w` is 1 / w; fragment code gets the value back as plane / inverse_w. These planes are
+/// evaluated with fused multiplications, first along x: fma(dy, y, fma(dx, x, c)); `depth` as (c + dx * x) + dy * y, as the depth test
+/// does.
 struct alignas(16) PrimitiveData {
-    float x0, y0;                ///< Window coordinates that planes are relative to.
+    float x0, y0;                ///< Window coordinates that `depth` is relative to.
     std::uint32_t primitive_id;  ///< gl_PrimitiveID
     std::uint32_t front_facing;  ///< 0 or 1
-    float point_x, point_y;      ///< Points: window coordinates of the left upper corner, for gl_PointCoord.
+    /// Window coordinates that `inverse_w` and the varyings are relative to. Points, whose values are the same everywhere: the left
+    /// upper corner, for gl_PointCoord.
+    float origin_x, origin_y;
     float inverse_point_size;    ///< Points: 1 / size.
     std::uint32_t layer;         ///< gl_Layer
     Plane depth;                 ///< gl_FragCoord.z, after the viewport transform.

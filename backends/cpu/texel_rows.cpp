@@ -17,10 +17,12 @@ namespace {
 
 using rhi::Format;
 
+// By a multiplication, which is off by one unit in the last place at most: so do Mesa's software drivers, and averages that lie in
+// the middle between two codes then fall to the same one.
 const std::array<float, 256>& unorm_bytes() {
     static const std::array<float, 256> table = [] {
         std::array<float, 256> values{};
-        for (std::uint32_t i = 0; i < 256; ++i) values[i] = static_cast<float>(i) / 255.0f;
+        for (std::uint32_t i = 0; i < 256; ++i) values[i] = static_cast<float>(i) * (1.0f / 255.0f);
         return values;
     }();
     return table;

@@ -196,8 +196,8 @@ void add_scene(CLI::App& app, SceneArguments& arguments, bool is_required = true
 void add_backend(CLI::App& app, SceneArguments& arguments) {
     app.add_option_function<std::string>(
            "-b,--backend", [&](const std::string& text) { arguments.backends = {text}; },
-           fmt::format("Where to render: NAME[:MODE][:CHECK][:lanes=N][:threads=N], NAME being auto (the first that "
-                       "works) or one of {}; checks of cpu are traps, sanitize and hostile[=N]",
+           fmt::format("Where to render: NAME[:MODE][:CHECK][:lanes=N][:threads=N], NAME being auto (the first that works: "
+                       "cpu) or one of {}; checks of cpu are traps, sanitize and hostile[=N]",
                        join(backend_names())))
         ->type_name("BACKEND")
         ->group("Device");

@@ -50,9 +50,17 @@ Component FragmentEmitter::evaluate_plane(std::size_t offset, const Place& place
     llvm::Value* c = primitive_word(offset + offsetof(Plane, c), builder.getFloatTy()).value;
     llvm::Value* dx = primitive_word(offset + offsetof(Plane, dx), builder.getFloatTy()).value;
     llvm::Value* dy = primitive_word(offset + offsetof(Plane, dy), builder.getFloatTy()).value;
-    llvm::Value* x = builder.CreateFSub(place.x, primitive_word(offsetof(PrimitiveData, x0), builder.getFloatTy()).value);
-    llvm::Value* y = builder.CreateFSub(place.y, primitive_word(offsetof(PrimitiveData, y0), builder.getFloatTy()).value);
-    return Component(builder.CreateFAdd(builder.CreateFAdd(c, builder.CreateFMul(dx, x)), builder.CreateFMul(dy, y)));
+    const bool is_depth = offset == offsetof(PrimitiveData, depth);
+    const auto relative = [&](llvm::Value* coordinate, std::size_t origin) {
+        return builder.CreateFSub(coordinate, primitive_word(origin, builder.getFloatTy()).value);
+    };
+    llvm::Value* x = relative(place.x, is_depth ? offsetof(PrimitiveData, x0) : offsetof(PrimitiveData, origin_x));
+    llvm::Value* y = relative(place.y, is_depth ? offsetof(PrimitiveData, y0) : offsetof(PrimitiveData, origin_y));
+    if (is_depth) return Component(builder.CreateFAdd(builder.CreateFAdd(c, builder.CreateFMul(dx, x)), builder.CreateFMul(dy, y)));
+    const auto fused = [&](llvm::Value* a, llvm::Value* b, llvm::Value* sum) {
+        return builder.CreateIntrinsic(sum->getType(), llvm::Intrinsic::fma, {a, b, sum});
+    };
+    return Component(fused(dy, y, fused(dx, x, c)));
 }
 
 Component FragmentEmitter::evaluate_input(std::uint32_t index, const Place& place, const Type& scalar) {
@@ -130,8 +138,8 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
             case BuiltIn::DeviceIndex: return {Component(int32(0))};
             case BuiltIn::PointCoord: {
                 llvm::Value* scale = primitive_word(offsetof(PrimitiveData, inverse_point_size), builder.getFloatTy()).value;
-                llvm::Value* left = primitive_word(offsetof(PrimitiveData, point_x), builder.getFloatTy()).value;
-                llvm::Value* top = primitive_word(offsetof(PrimitiveData, point_y), builder.getFloatTy()).value;
+                llvm::Value* left = primitive_word(offsetof(PrimitiveData, origin_x), builder.getFloatTy()).value;
+                llvm::Value* top = primitive_word(offsetof(PrimitiveData, origin_y), builder.getFloatTy()).value;
                 return {Component(builder.CreateFMul(builder.CreateFSub(center.x, left), scale)),
                         Component(builder.CreateFMul(builder.CreateFSub(center.y, top), scale))};
             }

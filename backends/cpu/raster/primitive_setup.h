@@ -25,6 +25,51 @@ NACRE_LANES_INLINE void store_planes(Plane* planes, Float4 c, Float4 dx, Float4 
     store4(&planes[0].c, c), store4(&planes[1].c, dx), store4(&planes[2].c, dy), store4(&planes[3].c, rest);
 }
 
+/// The slopes of values at three vertices, as factors of value 0 - value 1 and value 2 - value 0: in single precision and in the order
+/// of operations of Mesa's software drivers, whose interpolated values come out bit for bit.
+struct WindowSlopes {
+    float dx01, dy01, dx20, dy20;  ///< Differences of window coordinates over twice the area.
+    float x0, y0;                  ///< Of vertex 0, from the center of pixel (0, 0).
+    bool precise;                  ///< False for slivers: their area has lost too many digits.
+
+    WindowSlopes(const ScreenVertex& v0, const ScreenVertex& v1, const ScreenVertex& v2)
+        : dx01(v0.x - v1.x), dy01(v0.y - v1.y), dx20(v2.x - v0.x), dy20(v2.y - v0.y), x0(v0.x - 0.5f), y0(v0.y - 0.5f) {
+        const float area = dx01 * dy20 - dx20 * dy01;
+        precise = std::abs(area) > 0.03125f * (std::abs(dx01 * dy20) + std::abs(dx20 * dy01));
+        const float scale = 1.0f / area;
+        dx01 *= scale, dy01 *= scale, dx20 *= scale, dy20 *= scale;
+    }
+    /// T is float or Float4.
+    template <typename T>
+    NACRE_LANES_INLINE void plane(T value0, T value1, T value2, T& c, T& dx, T& dy) const {
+        const T difference01 = value0 - value1, difference20 = value2 - value0;
+        dx = difference01 * dy20 - difference20 * dy01;
+        dy = difference20 * dx01 - difference01 * dx20;
+        c = value0 - (dx * x0 + dy * y0);
+    }
+};
+
+inline void window_planes(const DrawPlan& draw, const WindowSlopes& slopes, const ScreenVertex* const (&vertices)[3],
+                          PrimitiveData& primitive) {
+    primitive.origin_x = primitive.origin_y = 0.5f;
+    primitive.inverse_w.reserved = 0.0f;
+    slopes.plane(vertices[0]->inverse_w, vertices[1]->inverse_w, vertices[2]->inverse_w, primitive.inverse_w.c,
+                 primitive.inverse_w.dx, primitive.inverse_w.dy);
+    const Float4 one = 1.0f - Float4{};
+    Plane* planes = primitive.varyings();
+    for (std::uint32_t input = 0; input < draw.input_count; input += 4, planes += 4) {
+        Int4 linear, flat;
+        std::memcpy(&linear, draw.linear_masks + input, sizeof(linear));
+        std::memcpy(&flat, draw.flat_masks + input, sizeof(flat));
+        const auto value = [&](int i) {
+            return load4(vertices[i]->inputs() + input) * select4(linear, one, vertices[i]->inverse_w - Float4{});
+        };
+        Float4 c, dx, dy;
+        slopes.plane(value(0), value(1), value(2), c, dx, dy);
+        store_planes(planes, c, dx, dy, flat, load4(vertices[0]->inputs() + input));
+    }
+}
+
 inline void homogeneous_planes(const DrawPlan& draw, const Record& record, const ScreenVertex* const (&vertices)[3],
                                PrimitiveData& primitive) {
     const ScreenPoint points[3] = {screen_point(vertices[0]->clip, draw.scale, draw.translation),
@@ -78,7 +123,8 @@ inline void set_up_primitive(const DrawPlan& draw, const Record& record, const s
     primitive.x0 = record.x0, primitive.y0 = record.y0;
     primitive.primitive_id = record.primitive_id;
     primitive.front_facing = record.bits & Record::front_facing;
-    primitive.point_x = primitive.point_y = primitive.inverse_point_size = 0.0f;
+    primitive.origin_x = record.x0, primitive.origin_y = record.y0;
+    primitive.inverse_point_size = 0.0f;
     primitive.layer = 0;
     primitive.depth = {record.depth_c, record.depth_dx, record.depth_dy, 0.0f};
 
@@ -92,6 +138,8 @@ inline void set_up_primitive(const DrawPlan& draw, const Record& record, const s
             return;
         case PlaneSource::window:
             vertices[1] = vertex(1), vertices[2] = vertex(2);
+            if (const WindowSlopes slopes(*vertices[0], *vertices[1], *vertices[2]); slopes.precise)
+                return window_planes(draw, slopes, vertices, primitive);
             weights = triangle_weights(static_cast<double>(vertices[1]->x) - vertices[0]->x,
                                        static_cast<double>(vertices[1]->y) - vertices[0]->y,
                                        static_cast<double>(vertices[2]->x) - vertices[0]->x,
@@ -115,8 +163,8 @@ inline void set_up_primitive(const DrawPlan& draw, const Record& record, const s
         case PlaneSource::point: {
             float size;
             std::memcpy(&size, &record.vertex[1], sizeof(size));
-            primitive.point_x = vertices[0]->x - 0.5f * size;
-            primitive.point_y = vertices[0]->y - 0.5f * size;
+            primitive.origin_x = vertices[0]->x - 0.5f * size;
+            primitive.origin_y = vertices[0]->y - 0.5f * size;
             primitive.inverse_point_size = 1.0f / size;
             break;
         }

@@ -96,6 +96,19 @@ NACRE_BINARY(Ints, &)
 NACRE_BINARY(Ints, |)
 NACRE_BINARY(Ints, ^)
 #undef NACRE_BINARY
+/// a * b + c, rounded once.
+NACRE_LANES_INLINE Floats fused(const Floats& a, const Floats& b, const Floats& c) {
+    Floats result;
+#if defined(__AVX512F__)
+    result.part[0] = (FloatRegister)_mm512_fmadd_ps((__m512)a.part[0], (__m512)b.part[0], (__m512)c.part[0]);
+#elif defined(__FMA__)
+    NACRE_EACH result.part[i] = (FloatRegister)_mm256_fmadd_ps((__m256)a.part[i], (__m256)b.part[i], (__m256)c.part[i]);
+#else
+    NACRE_EACH for (int lane = 0; lane < register_lanes; ++lane)
+        result.part[i][lane] = __builtin_fmaf(a.part[i][lane], b.part[i][lane], c.part[i][lane]);
+#endif
+    return result;
+}
 // Unsigned arithmetic underneath: integers wrap.
 #define NACRE_WRAPPING(OPERATOR)                                                                             \
     NACRE_LANES_INLINE Ints operator OPERATOR(const Ints& a, const Ints& b) {                                \

@@ -20,9 +20,9 @@ inline void finish_vertices(const VertexFinish& finish) {
     const Floats x = load(position), y = load(position + max_lanes), z = load(position + 2 * max_lanes),
                  w = load(position + 3 * max_lanes);
     const Floats inverse_w = floats(1.0f) / w;
-    const Floats window_x = x * inverse_w * floats(finish.scale[0]) + floats(finish.translation[0]);
-    const Floats window_y = y * inverse_w * floats(finish.scale[1]) + floats(finish.translation[1]);
-    const Floats window_z = z * inverse_w * floats(finish.scale[2]) + floats(finish.translation[2]);
+    const Floats window_x = fused(x * inverse_w, floats(finish.scale[0]), floats(finish.translation[0]));
+    const Floats window_y = fused(y * inverse_w, floats(finish.scale[1]), floats(finish.translation[1]));
+    const Floats window_z = fused(z * inverse_w, floats(finish.scale[2]), floats(finish.translation[2]));
 
     const Floats zero = floats(0.0f);
     Ints codes = code(less(x, zero - w), outside_left) | code(less(w, x), outside_right) |

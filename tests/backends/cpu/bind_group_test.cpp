@@ -61,7 +61,7 @@ TEST(BindGroups, HoldRangesViewsAndSamplers) {
     auto buffer = *CpuBuffer::create(memory, {.size = 1000, .usage = rhi::BufferUsage::storage});
     auto texture =
         *CpuTexture::create(memory, {.format = rhi::Format::rgba8_unorm, .width = 8, .height = 8, .mips = 4});
-    CpuSampler sampler({.mip_bias = 2.5f});
+    CpuSampler sampler({.mip_bias = 2.5f}, false);
     CpuBindGroupLayout layout({.bindings = {{0, BindingType::storage_buffer, 1, ShaderStage::compute},
                                             {1, BindingType::combined_texture_sampler, 2, ShaderStage::compute},
                                             {2, BindingType::sampled_texture, 0, ShaderStage::compute}}},

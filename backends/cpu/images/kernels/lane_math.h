@@ -111,46 +111,37 @@ NACRE_INLINE Floats<W> fraction(Floats<W> x) {
     return small - floor_small<W>(small);
 }
 
-/// Logarithm to base 2 within 2e-7 + 1 ulp; 0 and NaN (whose bits differ between machines) give -infinity, infinity
-/// gives 128. x >= 0.
+/// Logarithm to base 2, linear between the powers of two: too small by up to 0.0861. x >= 0; 0 and NaN (whose bits differ
+/// between machines) give -127, infinity gives 128.
 template <int W>
-NACRE_INLINE Floats<W> log2_lanes(Floats<W> x) {
-    const Ints<W> bits = (Ints<W>)x;
-    // Mantissa in [sqrt(1/2), sqrt(2)), so that the series converges quickly: |t| < 0.172.
-    const Ints<W> exponent = (Ints<W>)((Uints<W>)bits - 0x3f3504f3u) >> 23;
-    const Floats<W> mantissa = (Floats<W>)((Uints<W>)bits - ((Uints<W>)exponent << 23));
-    const Floats<W> t = (mantissa - 1.0f) / (mantissa + 1.0f), t2 = t * t;
-    // 2 / ln 2 * artanh(t)
-    const Floats<W> series =
-        t * (((((t2 * 0.32059889f) + 0.41219858f) * t2 + 0.57707802f) * t2 + 0.96179669f) * t2 + 2.8853901f);
-    const Floats<W> result = to_floats<W>(exponent) + series;
-    return x >= 1.17549435e-38f ? result : splat<W>(-__builtin_inff());
+NACRE_INLINE Floats<W> linear_log2(Floats<W> x) {
+    const Floats<W> result = to_floats<W>((Ints<W>)x - 0x3f800000) * 0x1p-23f;
+    return x >= 1.17549435e-38f ? result : splat<W>(-127.0f);
 }
 
-/// dFdx and dFdy inside of each quad.
+/// Lane `which` of each quad in all four lanes of it.
+template <int W, int which>
+NACRE_INLINE Floats<W> spread_in_quads(Floats<W> v) {
+    if constexpr (W == 4) {
+        return __builtin_shufflevector(v, v, which, which, which, which);
+    } else if constexpr (W == 8) {
+        return __builtin_shufflevector(v, v, which, which, which, which, which + 4, which + 4, which + 4, which + 4);
+    } else {
+        return __builtin_shufflevector(v, v, which, which, which, which, which + 4, which + 4, which + 4, which + 4,
+                                       which + 8, which + 8, which + 8, which + 8, which + 12, which + 12, which + 12,
+                                       which + 12);
+    }
+}
+
+/// Derivatives for the level of detail: one for each quad, from its upper left corner, as Mesa's software drivers take
+/// them. Shaders' own derivatives are the compiler's.
 template <int W>
 NACRE_INLINE Floats<W> difference_x(Floats<W> v) {
-    if constexpr (W == 4) {
-        return __builtin_shufflevector(v, v, 1, 1, 3, 3) - __builtin_shufflevector(v, v, 0, 0, 2, 2);
-    } else if constexpr (W == 8) {
-        return __builtin_shufflevector(v, v, 1, 1, 3, 3, 5, 5, 7, 7) -
-               __builtin_shufflevector(v, v, 0, 0, 2, 2, 4, 4, 6, 6);
-    } else {
-        return __builtin_shufflevector(v, v, 1, 1, 3, 3, 5, 5, 7, 7, 9, 9, 11, 11, 13, 13, 15, 15) -
-               __builtin_shufflevector(v, v, 0, 0, 2, 2, 4, 4, 6, 6, 8, 8, 10, 10, 12, 12, 14, 14);
-    }
+    return spread_in_quads<W, 1>(v) - spread_in_quads<W, 0>(v);
 }
 template <int W>
 NACRE_INLINE Floats<W> difference_y(Floats<W> v) {
-    if constexpr (W == 4) {
-        return __builtin_shufflevector(v, v, 2, 3, 2, 3) - __builtin_shufflevector(v, v, 0, 1, 0, 1);
-    } else if constexpr (W == 8) {
-        return __builtin_shufflevector(v, v, 2, 3, 2, 3, 6, 7, 6, 7) -
-               __builtin_shufflevector(v, v, 0, 1, 0, 1, 4, 5, 4, 5);
-    } else {
-        return __builtin_shufflevector(v, v, 2, 3, 2, 3, 6, 7, 6, 7, 10, 11, 10, 11, 14, 15, 14, 15) -
-               __builtin_shufflevector(v, v, 0, 1, 0, 1, 4, 5, 4, 5, 8, 9, 8, 9, 12, 13, 12, 13);
-    }
+    return spread_in_quads<W, 2>(v) - spread_in_quads<W, 0>(v);
 }
 
 /// 16-bit floats in the low half of each lane. Without arithmetic on denormals, which some code switches off.

@@ -17,6 +17,9 @@ struct LevelOfDetail {
     bool is_anisotropic = false;
     Floats<W> sample_count;
     Floats<W> axis[2];
+    /// Anisotropic filtering over the ellipse of these derivatives, in texels of level 0.
+    bool is_elliptical = false;
+    Floats<W> dx[2], dy[2];
 };
 
 /// @param coordinates  as the shader gave them (for cubes, directions)
@@ -59,8 +62,15 @@ template <int W>
             length_y = length_y + y * y;
         }
         const Floats<W> longest = maximum<W>(length_x, length_y);
-        lambda = 0.5f * log2_lanes<W>(longest);
-        if (sampler.max_anisotropy > 1.0f && axes == 2 && cube == nullptr) {
+        // The specification leaves the precision of the logarithm to the implementation; Mesa's software drivers take this one.
+        lambda = 0.5f * linear_log2<W>(longest);
+        if (call.sampler->is_elliptical && sampler.max_anisotropy > 1.0f && axes == 2 && spatial == 2 &&
+            !call.has(image_compare)) {
+            lambda = 0.5f * linear_log2<W>(minimum<W>(length_x, length_y));
+            result.is_elliptical = true;
+            for (int axis = 0; axis < 2; ++axis)
+                result.dx[axis] = dx[axis] * size[axis], result.dy[axis] = dy[axis] * size[axis];
+        } else if (sampler.max_anisotropy > 1.0f && axes == 2 && cube == nullptr) {
             const Floats<W> shortest = minimum<W>(length_x, length_y), one = splat<W>(1.0f);
             const float limit = sampler.max_anisotropy < 16.0f ? sampler.max_anisotropy : 16.0f;
             // The ratio of the axes. Where the footprint is a line it is as large as allowed, where it is a point it
@@ -68,7 +78,7 @@ template <int W>
             Floats<W> ratio = square_root<W>(longest) / square_root<W>(shortest);
             ratio = clamp<W>(ratio, one, splat<W>(limit));
             result.sample_count = -floor_small<W>(0.00390625f - ratio);
-            lambda = lambda - log2_lanes<W>(ratio);
+            lambda = 0.5f * linear_log2<W>(longest / (ratio * ratio));
             const Ints<W> is_x = length_x >= length_y;
             for (int axis = 0; axis < 2; ++axis) result.axis[axis] = is_x ? dx[axis] : dy[axis];
             result.is_anisotropic = (mask_bits<W>(result.sample_count > 1.0f) & call.live) != 0;

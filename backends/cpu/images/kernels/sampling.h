@@ -2,7 +2,7 @@
 // Filtered reads: sample, gather, query of the level of detail.
 #pragma once
 
-#include "backends/cpu/images/kernels/level_of_detail.h"
+#include "backends/cpu/images/kernels/elliptical_filter.h"
 
 namespace nacre::cpu::NACRE_KERNEL_NAMESPACE {
 namespace {
@@ -145,6 +145,30 @@ template <int W>
     }
 }
 
+/// One level over the whole ellipse.
+template <int W>
+[[gnu::noinline]] void sample_ellipse(const Sampling<W>& sampling, const LevelOfDetail<W>& detail, const Source& source,
+                                      std::uint32_t level, std::uint32_t live, Floats<W>* out) {
+    const rhi::SamplerDesc& sampler = *sampling.sampler;
+    const auto load = [&](Ints<W> x, Ints<W> y, Floats<W>* texel) {
+        if (sampling.offset != nullptr) {
+            x += bounded_offset<W>(sampling.offset[0]);
+            y += bounded_offset<W>(sampling.offset[1]);
+        }
+        Taps<W> taps;
+        Ints<W> x_is_border, y_is_border;
+        wrap<W>(x, x_is_border, source.width, sampler.address_u, true);
+        wrap<W>(y, y_is_border, source.height, sampler.address_v, true);
+        taps.has_border = sampler.address_u == rhi::AddressMode::clamp_to_border ||
+                          sampler.address_v == rhi::AddressMode::clamp_to_border;
+        taps.places[0] = place_texel<W>(source, x, y, sampling.slice);
+        taps.is_border[0] = x_is_border | y_is_border;
+        load_tap<W>(source, taps, 0, sampler.border, texel);
+    };
+    average_ellipse<W>(source, sampler, detail, sampling.coordinates, 1.0f / static_cast<float>(1u << level), live, load,
+                       out);
+}
+
 /// One level with the filter's full footprint.
 template <int W>
 NACRE_INLINE void sample_level(const Sampling<W>& sampling, const LevelOfDetail<W>& detail, std::uint32_t level,
@@ -154,6 +178,7 @@ NACRE_INLINE void sample_level(const Sampling<W>& sampling, const LevelOfDetail<
         for (int c = 0; c < 4; ++c) out[c] = splat<W>(0.0f);
         return;
     }
+    if (detail.is_elliptical) return sample_ellipse<W>(sampling, detail, source, level, sampling.call->live, out);
     if (!detail.is_anisotropic) return sample_once<W>(sampling, source, sampling.coordinates, is_linear, out);
     // Samples at i / (N + 1) - 1/2 of the longer axis, i = 1 ... N.
     Floats<W> sum[4] = {};
@@ -201,7 +226,9 @@ template <int W>
     if (image.mip_count > 1 || magnifies_linearly != minifies_linearly || sampler.max_anisotropy > 1.0f) {
         level_of_detail<W>(call, sampling.coordinates, sampling.is_cube ? &sampling.cube : nullptr, sampling.spatial,
                            detail);
-        if (is_integer) detail.is_anisotropic = false;
+        if (is_integer) detail.is_anisotropic = detail.is_elliptical = false;
+        // The ellipse reads the finer one of two levels.
+        if (detail.is_elliptical) detail.lambda = floor_small<W>(detail.lambda);
         select_levels<W>(detail.lambda, image.mip_count, !is_integer && sampler.mip == rhi::Filter::linear, level,
                          next_weight);
         if (magnifies_linearly != minifies_linearly) {

@@ -70,6 +70,14 @@ std::array<double, 3> cube_point(int face, double s, double t) {
     }
 }
 
+// Linear between the powers of two, in double: what samples of images take for the logarithm.
+double linear_log2(double x) {
+    if (x <= 0) return -127;
+    int exponent = 0;
+    const double mantissa = std::frexp(x, &exponent);
+    return exponent + 2 * mantissa - 2;
+}
+
 }  // namespace
 
 int ReferenceSampler::decide(double value) {
@@ -114,8 +122,8 @@ ReferenceSampler::Detail ReferenceSampler::detail(std::uint32_t flags, std::span
             if ((flags & image_lod_gradient) != 0) {
                 dx[axis] = point.gradient_x[axis], dy[axis] = point.gradient_y[axis];
             } else {
-                dx[axis] = coordinate(quad[index | 1], axis) - coordinate(quad[index & ~1u], axis);
-                dy[axis] = coordinate(quad[index | 2], axis) - coordinate(quad[index & ~2u], axis);
+                dx[axis] = coordinate(quad[1], axis) - coordinate(quad[0], axis);
+                dy[axis] = coordinate(quad[2], axis) - coordinate(quad[0], axis);
             }
         }
         int texel_axes = axes;
@@ -155,13 +163,13 @@ ReferenceSampler::Detail ReferenceSampler::detail(std::uint32_t flags, std::span
         }
         length_x = std::sqrt(length_x), length_y = std::sqrt(length_y);
         const double longest = std::max(length_x, length_y), shortest = std::min(length_x, length_y);
-        lambda = std::log2(longest);
+        lambda = 0.5 * linear_log2(longest * longest);
         if (sampler_.max_anisotropy > 1.0f && axes == 2) {
             const double ratio = std::min<double>(longest / shortest, sampler_.max_anisotropy);
             result.samples = static_cast<int>(std::ceil(ratio));
             // Close above a whole number one sample less is allowed to do.
             if (ratio - std::floor(ratio) < 0.005) is_ambiguous_ = true;
-            lambda = std::log2(longest / ratio);
+            lambda = 0.5 * linear_log2(longest / ratio * (longest / ratio));
             const Vector& major = length_x >= length_y ? dx : dy;
             result.axis = {major[0], major[1]};
         }

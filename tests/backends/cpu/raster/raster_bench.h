@@ -159,8 +159,13 @@ void vertex_function(const cpu::ShaderContext*, const cpu::VertexDraw* draw, cpu
         }
 }
 
-inline float plane_at(const cpu::Plane& plane, const cpu::PrimitiveData& primitive, float x, float y) {
+/// As compiled fragment code evaluates planes: of the depth, and of everything else.
+inline float depth_at(const cpu::PrimitiveData& primitive, float x, float y) {
+    const cpu::Plane& plane = primitive.depth;
     return plane.c + plane.dx * (x - primitive.x0) + plane.dy * (y - primitive.y0);
+}
+inline float plane_at(const cpu::Plane& plane, const cpu::PrimitiveData& primitive, float x, float y) {
+    return std::fma(plane.dy, y - primitive.origin_y, std::fma(plane.dx, x - primitive.origin_x, plane.c));
 }
 inline std::uint32_t bits_of(float value) { return std::bit_cast<std::uint32_t>(value); }
 
@@ -200,10 +205,10 @@ void fragment_function(const cpu::ShaderContext* context, cpu::FragmentBatch* ba
                 for (int i = 0; i < 4; ++i) v[i] = plane_at(primitive.varyings()[i], primitive, x, y);
                 color(v[0] * w, v[1] * w, v[2], v[3]);
             } else if constexpr (shader == TestShader::position) {
-                color(x, y, plane_at(primitive.depth, primitive, x, y), plane_at(primitive.inverse_w, primitive, x, y));
+                color(x, y, depth_at(primitive, x, y), plane_at(primitive.inverse_w, primitive, x, y));
             } else if constexpr (shader == TestShader::point) {
-                color((x - primitive.point_x) * primitive.inverse_point_size,
-                      (y - primitive.point_y) * primitive.inverse_point_size, 0, 1);
+                color((x - primitive.origin_x) * primitive.inverse_point_size,
+                      (y - primitive.origin_y) * primitive.inverse_point_size, 0, 1);
             } else if constexpr (shader == TestShader::coverage) {
                 colors[0][0][lane] = batch.sample_mask_in[lane];
                 colors[0][1][lane] = batch.sample_index;
