@@ -155,6 +155,7 @@ void note_race(const RunningInvocations& running, const CheckSite& site, const A
     use.lane = static_cast<std::uint16_t>(is_compute ? local_index(running, lane) : lane);
     use.barriers = static_cast<std::uint16_t>(running.barriers);
     use.is_atomic = (access & access_atomic) != 0;
+    use.is_private = (access & access_workgroup) != 0;
     for (std::uint32_t done = 0; done < bytes;) {
         const std::uint64_t place = at.offset + done;
         const std::uint32_t first = place % 4, count = std::min(4 - first, bytes - done);

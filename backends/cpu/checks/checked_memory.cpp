@@ -36,7 +36,7 @@ std::array<std::atomic_flag, 251> WordLock::flags;
 bool races(const WordUse& earlier, const WordUse& later) {
     if (earlier.scope != later.scope || (earlier.bytes & later.bytes) == 0) return false;
     if (earlier.is_atomic && later.is_atomic) return false;
-    if (earlier.batch != later.batch) return true;
+    if (earlier.batch != later.batch) return !later.is_private;
     return earlier.lane != later.lane && earlier.barriers == later.barriers;
 }
 
@@ -169,7 +169,8 @@ std::optional<WordUse> CheckedMemory::note_use(std::uint64_t offset, bool writes
     // The first reader of a scope is kept, so that a write behind several reads finds one that is not its own; readers of
     // other times are of no more use.
     const WordUse& first = word.first_read;
-    const bool is_over = first.scope != use.scope || (first.batch == use.batch && first.barriers != use.barriers);
+    const bool is_over = first.scope != use.scope || (first.batch != use.batch && use.is_private) ||
+                         (first.batch == use.batch && first.barriers != use.barriers);
     if (is_over) word.first_read = use;
     word.last_read = use;
     return other;

@@ -28,6 +28,7 @@ struct WordUse {
     std::uint16_t barriers = 0;  ///< Workgroup barriers that it had passed.
     std::uint8_t bytes = 0;      ///< One bit for each byte of the word.
     bool is_atomic = false;
+    bool is_private = false;     ///< Each batch has content of its own, one after another: a workgroup's memory.
 };
 
 /// A view's texels as numbers: 1 where any byte is undefined, else 0. What sampling makes of them tells whether an undefined
