@@ -25,21 +25,29 @@ void Transfer::fill_plane(const std::array<ImageLevel, max_mips>& levels, const 
     }
 }
 
-void Transfer::clear_color(const ImageView& view, const rhi::ClearColor& color) {
+std::array<std::byte, 16> cleared_texel(rhi::Format format, const rhi::ClearColor& color) {
     Texel texel{};
     static_assert(sizeof color == sizeof texel);
     std::memcpy(&texel, &color, sizeof texel);
-    alignas(16) std::array<std::byte, 16> bytes{};
-    encode_texel(view.format, texel, bytes.data());
-    fill_plane(view.levels, view, bytes.data(), view.texel_bytes);
+    std::array<std::byte, 16> bytes{};
+    encode_texel(format, texel, bytes.data());
+    return bytes;
 }
 
-void Transfer::clear_depth(const ImageView& view, float depth) {
+std::array<std::byte, 4> cleared_depth(rhi::Format format, float depth) {
     Texel texel{};
     texel.f[0] = depth > 0.0f ? std::min(depth, 1.0f) : 0.0f;
     std::array<std::byte, 4> bytes{};
-    encode_texel(view.format, texel, bytes.data());
-    fill_plane(view.levels, view, bytes.data(), view.texel_bytes);
+    encode_texel(format, texel, bytes.data());
+    return bytes;
+}
+
+void Transfer::clear_color(const ImageView& view, const rhi::ClearColor& color) {
+    fill_plane(view.levels, view, cleared_texel(view.format, color).data(), view.texel_bytes);
+}
+
+void Transfer::clear_depth(const ImageView& view, float depth) {
+    fill_plane(view.levels, view, cleared_depth(view.format, depth).data(), view.texel_bytes);
 }
 
 void Transfer::clear_stencil(const ImageView& view, std::uint8_t stencil) {

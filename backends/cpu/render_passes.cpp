@@ -18,16 +18,19 @@ void Executor::begin_render_pass(const rhi::BeginRenderPassCommand& command) {
         ImageView& view = targets_.colors.emplace_back();
         if (!color.view.texture.object) continue;
         view = texture_of(color.view.texture).make_view(color.view);
-        if (color.load == LoadOperation::clear) transfer_.clear_color(view, color.clear);
+        if (color.load == LoadOperation::clear) {
+            targets_.color_clears.resize(command.color_count);
+            targets_.color_clears[i] = cleared_texel(view.format, color.clear);
+        }
         if (color.resolve.texture.object)
             resolves_.push_back({i, texture_of(color.resolve.texture).make_view(color.resolve)});
     }
     if (command.has_depth_stencil) {
         targets_.depth_stencil = texture_of(command.depth_stencil.texture).make_view(command.depth_stencil);
         if (command.depth_load == LoadOperation::clear && !command.read_only)
-            transfer_.clear_depth(targets_.depth_stencil, command.clear_depth);
+            targets_.depth_clear = cleared_depth(targets_.depth_stencil.format, command.clear_depth);
         if (command.stencil_load == LoadOperation::clear && !command.read_only)
-            transfer_.clear_stencil(targets_.depth_stencil, command.clear_stencil);
+            targets_.stencil_clear = command.clear_stencil;
     }
     viewport_ = {0.0f, 0.0f, static_cast<float>(command.width), static_cast<float>(command.height), 0.0f, 1.0f};
     scissor_ = {0, 0, command.width, command.height};

@@ -14,6 +14,11 @@
 
 namespace nacre::cpu {
 
+/// Bytes of the texel that a clear writes; those behind `rhi::info(format).block_bytes` are zero.
+std::array<std::byte, 16> cleared_texel(rhi::Format format, const rhi::ClearColor& color);
+/// The same of a depth plane.
+std::array<std::byte, 4> cleared_depth(rhi::Format format, float depth);
+
 class Transfer {
   public:
     explicit Transfer(Scheduler& scheduler) : scheduler_(scheduler) {}

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -44,7 +45,7 @@ bool Bench::wants(const std::string& kind) const {
 }
 
 std::vector<std::uint32_t> Bench::lane_counts() const {
-    return options_.quick ? std::vector<std::uint32_t>{16} : std::vector<std::uint32_t>{16, 8};
+    return options_.quick || std::getenv("ALONE") ? std::vector<std::uint32_t>{16} : std::vector<std::uint32_t>{16, 8};
 }
 
 Expected<std::unique_ptr<rhi::Device>> Bench::new_device(const std::string& spec) const {
@@ -58,7 +59,7 @@ Expected<rhi::Device*> Bench::device(const std::string& spec) {
 }
 
 bool Bench::has_device(const std::string& spec) {
-    if (unavailable_.contains(spec)) return false;
+    if (unavailable_.contains(spec) || std::getenv("ALONE")) return false;
     const auto made = device(spec);
     if (made) return true;
     unavailable_[spec] = made.error().message();
@@ -73,6 +74,19 @@ void Bench::skip(const std::string& name, const std::string& why) {
 }
 
 Expected<void> Bench::measure(Case work) {
+    if (std::getenv("ALONE")) {
+        for (Side& side : work.cpu) {
+            std::vector<double> t;
+            for (std::uint32_t r = 0; r < options_.rounds; ++r) {
+                const auto c = std::clock();
+                NACRE_CHECK(side.run());
+                t.push_back(double(std::clock() - c) * 1e3 / CLOCKS_PER_SEC);
+            }
+            std::ranges::sort(t);
+            fmt::print("{:34} {:2} least {:.2f} quarter {:.2f} median {:.2f}\n", work.name, side.lanes, t[0], t[t.size() / 4], t[t.size() / 2]);
+        }
+        return {};
+    }
     if (!work.name.starts_with(options_.prefix) || work.cpu.empty() || work.references.empty()) return {};
     struct Measured {
         Side* side;
@@ -186,7 +200,7 @@ Expected<double> time_submission(rhi::Device& device, const std::function<void(r
     });
 }
 
-std::string cpu_spec(std::uint32_t lanes) { return fmt::format("cpu:lanes={}", lanes); }
+std::string cpu_spec(std::uint32_t lanes) { return fmt::format("cpu:lanes={}{}", lanes, std::getenv("ALONE") ? ":threads=1" : ""); }
 
 Expected<Kernel> make_kernel(rhi::Device& device, const std::string& path, std::vector<rhi::BindGroupEntry> entries) {
     rhi::ShaderCompiler compiler({.embedded = {embedded_files()}});

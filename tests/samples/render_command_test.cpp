@@ -281,6 +281,27 @@ TEST_F(RenderCommandTest, BackendAgreesWithItself) {
     EXPECT_EQ(comparison["results"][0]["final"]["psnr_db"], 200.0);
 }
 
+// Lane counts and threads must not show in the consistent mode: every texture of the frame has the same bits.
+TEST_F(RenderCommandTest, LanesAndThreadsLeaveConsistentPicturesAlone) {
+    if (std::ranges::find(backends(), "cpu") == backends().end()) GTEST_SKIP() << "no backend 'cpu' works here";
+    for (const char* scene : {"builtin:spheres", "builtin:alpha"}) {
+        const CommandResult result =
+            nacre({"compare", scene, "--backends",
+                   "cpu:consistent:lanes=16:threads=2,cpu:consistent:lanes=16:threads=1,cpu:consistent:lanes=8,"
+                   "cpu:consistent:lanes=4",
+                   "--size", "320x180", "--json", file("c.json")});
+        ASSERT_EQ(result.exit_code, 0) << result.output << result.errors;
+        const json comparison = read_json(file("c.json"));
+        ASSERT_EQ(comparison["results"].size(), 3u);
+        for (const json& backend : comparison["results"]) {
+            EXPECT_THAT(backend["textures"].size(), Gt(3u));
+            for (const json& texture : backend["textures"])
+                EXPECT_EQ(texture["differing"], 0) << scene << " " << backend["backend"] << " " << texture["name"];
+            EXPECT_EQ(backend["final"]["psnr_db"], 200.0);
+        }
+    }
+}
+
 TEST_F(RenderCommandTest, BackendsAgreeWithEachOther) {
     if (backends().size() < 2) GTEST_SKIP() << "only one backend works here";
     std::string list;

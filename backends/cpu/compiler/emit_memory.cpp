@@ -527,6 +527,8 @@ std::vector<Component> Emitter::load(const Pointer& pointer) {
             ++index;
         });
     } else if (pointer.kind == Pointer::Kind::bytes) {
+        if (auto rows = follows_undefined() ? std::nullopt : load_rows(pointer)) return std::move(*rows);
+        if (auto equal = follows_undefined() ? std::nullopt : load_where_equal(pointer)) return std::move(*equal);
         visit_layout(pointer, pointer.type, 0, [&](const Pointer& at, std::int64_t extra, const Type& scalar) {
             values.push_back(load_bytes(at, extra, scalar));
             if (follows_undefined()) note_read(at, extra, scalar, values.back());
@@ -550,6 +552,7 @@ void Emitter::store(const Pointer& pointer, const std::vector<Component>& values
             ++index;
         });
     } else if (pointer.kind == Pointer::Kind::bytes) {
+        if (!follows_undefined() && store_rows(pointer, values)) return;
         visit_layout(pointer, pointer.type, 0, [&](const Pointer& at, std::int64_t extra, const Type& scalar) {
             if (follows_undefined()) note_write(at, extra, scalar, values.at(index));
             store_bytes(at, extra, scalar, values.at(index++));

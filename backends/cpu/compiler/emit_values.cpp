@@ -107,10 +107,14 @@ Value Emitter::get(Id id) {
     const auto& slots_of = is_outside ? where.outside_slots : where.slots;
     for (std::size_t i = 0; i < value.components.size(); ++i)
         if (i < slots_of.size() && slots_of[i]) {
-            value.components[i] = Component(builder.CreateLoad(slots_of[i]->getAllocatedType(), slots_of[i]));
-            if (i < where.undefined_slots.size() && where.undefined_slots[i] && !is_outside)
-                value.components[i].undefined =
-                    builder.CreateLoad(where.undefined_slots[i]->getAllocatedType(), where.undefined_slots[i]);
+            Component loaded(builder.CreateLoad(slots_of[i]->getAllocatedType(), slots_of[i]));
+            if (!is_outside && i < where.linear_slots.size() && where.linear_slots[i]) {
+                loaded.linear_base = builder.CreateLoad(builder.getInt32Ty(), where.linear_slots[i]);
+                loaded.linear_stride = value.components[i].linear_stride;
+            }
+            if (!is_outside && i < where.undefined_slots.size() && where.undefined_slots[i])
+                loaded.undefined = builder.CreateLoad(where.undefined_slots[i]->getAllocatedType(), where.undefined_slots[i]);
+            value.components[i] = loaded;
         }
     return value;
 }
@@ -150,6 +154,12 @@ void Emitter::finish_definition(Id id) {
                 llvm::AllocaInst* undefined = make_slot(component.undefined->getType(), "undefined");
                 builder.CreateStore(component.undefined, undefined);
                 definition.undefined_slots.back() = undefined;
+            }
+            if (component.linear_base && component.linear_base->getType()->isIntegerTy(32)) {
+                definition.linear_slots.resize(value.components.size());
+                llvm::AllocaInst*& base = definition.linear_slots[definition.slots.size() - 1];
+                base = make_slot(builder.getInt32Ty(), "linear");
+                builder.CreateStore(component.linear_base, base);
             }
             if (!differs) continue;
             // Lanes that have left the loop keep what they had.

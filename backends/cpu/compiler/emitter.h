@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
@@ -302,6 +303,34 @@ class Emitter {
                      const Component& limit = {}, const Pointer* pointer = nullptr);
     std::shared_ptr<CheckNotes> check_notes;
 
+    // ---- Elements of neighboring lanes side by side (emit_rows.cpp)
+    /// How the elements that a pointer means lie in memory, in words of 32 bits.
+    struct RowLayout {
+        std::uint32_t stride = 0;          ///< From lane to lane.
+        std::int64_t first = 0;            ///< Bytes from the pointer to the first word that counts.
+        std::uint32_t span = 0;            ///< From there to behind the last.
+        std::vector<std::uint32_t> words;  ///< Of each scalar, from `first` on.
+    };
+    /// Nothing where the lanes' elements do not lie side by side, or are not made of words.
+    std::optional<RowLayout> row_layout(const Pointer& pointer);
+    std::optional<std::vector<Component>> load_rows(const Pointer& pointer);
+    /// False: nothing was stored, for there are no rows.
+    bool store_rows(const Pointer& pointer, const std::vector<Component>& values);
+    /// Loads of several scalars by addresses that may differ from lane to lane, but mostly do not.
+    std::optional<std::vector<Component>> load_where_equal(const Pointer& pointer);
+    llvm::Value* row_start(const Pointer& pointer, const RowLayout& rows);
+    /// Where a value of `load_rows` comes from: word `word` of the stream that begins with `stream`.
+    struct RowOrigin {
+        std::shared_ptr<const std::vector<llvm::Value*>> stream;
+        std::uint32_t word = 0;
+    };
+    std::unordered_map<llvm::Value*, RowOrigin> row_origins;
+    std::vector<llvm::Value*> split_rows(const std::vector<llvm::Value*>& stream);
+    std::vector<llvm::Value*> join_rows(const std::vector<llvm::Value*>& words);
+    llvm::Value* pick(const std::vector<llvm::Value*>& vectors,
+                      const std::function<std::pair<std::size_t, std::size_t>(std::uint32_t)>& from);
+    llvm::Value* all(const Component& condition);  ///< i1: it holds in all lanes (null: it does).
+
     // ---- Stages: what only they know.
     virtual std::vector<Component> input_components(const Variable& variable) = 0;
     /// Base pointer and size of the workgroup's memory.
@@ -356,7 +385,10 @@ class Emitter {
             std::uint32_t block = 0;
             std::uint64_t chain = 0;
             std::vector<llvm::AllocaInst*> slots, outside_slots;
+<<<<<<< HEAD
             std::vector<llvm::AllocaInst*> undefined_slots;  ///< Null where nothing is undefined.
+=======
+            std::vector<llvm::AllocaInst*> linear_slots;  ///< Of `linear_base`, where there is one; empty: nowhere.
         };
         std::unordered_map<Id, Definition> definitions;
         std::unordered_map<Id, Value> values;

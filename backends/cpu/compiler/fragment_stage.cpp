@@ -20,8 +20,9 @@ constexpr std::array<std::array<float, 2>, 4> sample_places{{{0.375f, 0.125f}, {
 
 }  // namespace
 
-/// Four floats at an offset in each quad's primitive, each spread over the quad: element `part` for every lane.
+/// The word at an offset in each quad's primitive, spread over the quad.
 Component FragmentEmitter::primitive_word(std::size_t offset, llvm::Type* type) {
+    if (is_one_primitive) return Component(splat(invariant_load(type, at_offset(primitives[0], static_cast<std::int64_t>(offset)), 4)));
     const std::uint32_t quads = lanes / 4;
     const std::size_t aligned = offset / 16 * 16;
     const int part = static_cast<int>(offset % 16 / 4);
@@ -76,6 +77,45 @@ Component FragmentEmitter::evaluate_input(std::uint32_t index, const Place& plac
     return scalar.bits == 32 ? value : Component(math.convert_float(value.value, scalar_type(scalar)));
 }
 
+std::vector<llvm::Value*> FragmentEmitter::evaluate_inputs() {
+    std::vector<llvm::Value*> values;
+    for (std::uint32_t i = 0; i < input_scalars_.size(); ++i) {
+        const InterfaceScalar& at = input_scalars_[i];
+        values.push_back(evaluate_input(i, at.centroid && !program.runs_per_sample ? centroid : center, module.type(at.type)).value);
+    }
+    values.push_back(evaluate_plane(offsetof(PrimitiveData, depth), center).value);
+    values.push_back(evaluate_plane(offsetof(PrimitiveData, inverse_w), center).value);
+    return values;
+}
+
+std::vector<llvm::Value*> FragmentEmitter::for_one_or_several(const std::function<std::vector<llvm::Value*>()>& evaluate) {
+    llvm::Value* is_one = builder.getTrue();
+    for (std::uint32_t q = 1; q < lanes / 4; ++q) is_one = builder.CreateAnd(is_one, builder.CreateICmpEQ(primitives[q], primitives[0]));
+    llvm::BasicBlock* one = llvm::BasicBlock::Create(context, "one_primitive", function_);
+    llvm::BasicBlock* several = llvm::BasicBlock::Create(context, "several_primitives", function_);
+    llvm::BasicBlock* next = llvm::BasicBlock::Create(context, "inputs", function_);
+    builder.CreateCondBr(is_one, one, several);
+    const auto fill = [&](llvm::BasicBlock*& block, bool of_one) {
+        builder.SetInsertPoint(block);
+        is_one_primitive = of_one;
+        std::vector<llvm::Value*> values = evaluate();
+        is_one_primitive = false;
+        block = builder.GetInsertBlock();
+        builder.CreateBr(next);
+        return values;
+    };
+    const std::vector<llvm::Value*> of_one = fill(one, true), of_several = fill(several, false);
+    builder.SetInsertPoint(next);
+    std::vector<llvm::Value*> values;
+    for (std::size_t i = 0; i < of_one.size(); ++i) {
+        llvm::PHINode* value = builder.CreatePHI(of_one[i]->getType(), 2);
+        value->addIncoming(of_one[i], one);
+        value->addIncoming(of_several[i], several);
+        values.push_back(value);
+    }
+    return values;
+}
+
 FragmentEmitter::Place FragmentEmitter::place_at(llvm::Value* inside_x, llvm::Value* inside_y) {
     return {builder.CreateFAdd(pixel_x, inside_x), builder.CreateFAdd(pixel_y, inside_y)};
 }
@@ -105,6 +145,7 @@ void FragmentEmitter::declare_inputs() {
             program.uses_centroid = program.uses_centroid || (at.centroid && !is_flat);
             numbers.push_back(static_cast<std::uint32_t>(program.inputs.size()));
             program.inputs.push_back(input);
+            input_scalars_.push_back(at);
         }
     }
     for (const auto& [id, function] : module.functions())
@@ -125,8 +166,7 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
     if (variable.builtin) {
         switch (*variable.builtin) {
             case BuiltIn::FragCoord:
-                return {Component(center.x), Component(center.y), evaluate_plane(offsetof(PrimitiveData, depth), center),
-                        evaluate_plane(offsetof(PrimitiveData, inverse_w), center)};
+                return {Component(center.x), Component(center.y), Component(inputs_[inputs_.size() - 2]), Component(inputs_.back())};
             case BuiltIn::FrontFacing: {
                 llvm::Value* word = primitive_word(offsetof(PrimitiveData, front_facing), builder.getInt32Ty()).value;
                 return {Component(builder.CreateICmpNE(word, llvm::Constant::getNullValue(word->getType())))};
@@ -160,10 +200,7 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
     const auto numbers = input_numbers_.find(variable.instruction.result);
     if (!scalars || numbers == input_numbers_.end()) reject(fmt::format("input '{}' is not supported in fragment shaders", variable.name));
     std::vector<Component> made;
-    for (std::size_t i = 0; i < scalars->size(); ++i) {
-        const InterfaceScalar& at = (*scalars)[i];
-        made.push_back(evaluate_input(numbers->second[i], at.centroid && !program.runs_per_sample ? centroid : center, module.type(at.type)));
-    }
+    for (const std::uint32_t number : numbers->second) made.push_back(Component(inputs_[number]));
     return made;
 }
 
@@ -308,6 +345,7 @@ void FragmentEmitter::emit_batch() {
         };
         centroid = place_at(lane_float(offsetof(FragmentBatch, centroid_x)), lane_float(offsetof(FragmentBatch, centroid_y)));
     }
+    inputs_ = for_one_or_several([&] { return evaluate_inputs(); });
     live_slot = make_slot(mask_type, "live");
     llvm::Value* live_bits = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, live)), llvm::Align(4));
     store_live(builder.CreateBitCast(builder.CreateTrunc(live_bits, builder.getIntNTy(lanes)), mask_type));

@@ -50,6 +50,8 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
     if (!keeps_variables)
         optimizer.RegisterPass(spvtools::CreateScalarReplacementPass(100))
             .RegisterPass(spvtools::CreateLocalAccessChainConvertPass())
+            // Access chains that nothing uses any more would keep variables from becoming values.
+            .RegisterPass(spvtools::CreateAggressiveDCEPass(true))
             .RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass())
             .RegisterPass(spvtools::CreateLocalSingleStoreElimPass())
             .RegisterPass(spvtools::CreateSSARewritePass());

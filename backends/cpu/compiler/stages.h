@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
+
 #include "backends/cpu/compiler/emitter.h"
+#include "backends/cpu/compiler/stage_interface.h"
 
 /// @file
 /// The three stages: each makes the function that the rest of the backend calls, fills the shader's inputs and takes its
@@ -64,6 +67,9 @@ class FragmentEmitter final : public Emitter {
     Component evaluate_plane(std::size_t offset, const Place& place);  ///< Of the plane at a byte offset in PrimitiveData.
     Component evaluate_input(std::uint32_t index, const Place& place, const Type& scalar);
     Component primitive_word(std::size_t offset, llvm::Type* type);
+    std::vector<llvm::Value*> evaluate_inputs();
+    /// `evaluate` for batches of one primitive and for others, whichever the batch is.
+    std::vector<llvm::Value*> for_one_or_several(const std::function<std::vector<llvm::Value*>()>& evaluate);
     Place place_at(llvm::Value* inside_x, llvm::Value* inside_y);
     Component difference(const Component& value, bool vertical, bool is_fine);
     void emit_batch();
@@ -71,9 +77,12 @@ class FragmentEmitter final : public Emitter {
     void declare_inputs();
     llvm::Value* batch = nullptr;
     std::array<llvm::Value*, max_quads> primitives{};
+    bool is_one_primitive = false;  ///< While code is emitted for batches whose quads all have the first one's primitive.
     llvm::Value *pixel_x = nullptr, *pixel_y = nullptr;  ///< Float, left upper corner of each lane's pixel.
     Place center, centroid;
     std::unordered_map<Id, std::vector<std::uint32_t>> input_numbers_;  ///< For each scalar of an input variable.
+    std::vector<InterfaceScalar> input_scalars_;  ///< For each of program.inputs.
+    std::vector<llvm::Value*> inputs_;            ///< Their values, and behind them gl_FragCoord.z and .w.
 };
 
 }  // namespace nacre::cpu

@@ -2,6 +2,7 @@
 #include "backends/cpu/raster/chunk.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "backends/cpu/raster/clip.h"
@@ -11,12 +12,18 @@
 namespace nacre::cpu::raster {
 namespace {
 
-/// Slopes beyond this come from triangles without area; flat is the best that can be said of them.
-constexpr double steepest = 1e30;
-
 struct DepthPlane {
     double c = 0.0, dx = 0.0, dy = 0.0;
 };
+
+/// What depth bias counts in depths of fixed point; 0 for floats, where it depends on the depth.
+double fixed_unit(DepthLayout layout) {
+    switch (layout) {
+        case DepthLayout::unorm16: return 0x1p-16;
+        case DepthLayout::unorm24: return 0x1p-24;
+        default: return 0.0;
+    }
+}
 
 /// Makes records of the primitives of one segment.
 class Assembler {
@@ -30,7 +37,8 @@ class Assembler {
           scratch_(scratch),
           draw_bits_(draw_index << Record::draw_shift) {}
 
-    void triangle(std::uint32_t local0, std::uint32_t local1, std::uint32_t local2, std::uint32_t primitive_id);
+    /// All triangles of the segment.
+    void triangles(const Segment& segment, const Kernels& kernels);
     void line(std::uint32_t local0, std::uint32_t local1, std::uint32_t provoking, std::uint32_t primitive_id,
               bool front, bool is_edge);
     void point(std::uint32_t local, std::uint32_t primitive_id);
@@ -47,6 +55,7 @@ class Assembler {
         std::uint32_t primitive_id;
     };
 
+    void triangle(std::uint32_t local0, std::uint32_t local1, std::uint32_t local2, std::uint32_t primitive_id);
     const ScreenVertex& vertex(std::uint32_t offset) const {
         return *reinterpret_cast<const ScreenVertex*>(chunk_.vertices.data() + static_cast<std::size_t>(offset) * 16);
     }
@@ -62,7 +71,7 @@ class Assembler {
     int gather_planes(const std::uint32_t* locals, int count, std::uint32_t codes, ClipPlane* planes) const;
     std::uint32_t vertex_between(const SetupVertex& a, const SetupVertex& b, double t);
     void add(const Corners& corners, const Source& source, std::uint32_t bits);
-    void bin(std::uint32_t record, std::int32_t low_x, std::int32_t high_x, std::int32_t low_y, std::int32_t high_y);
+    void bin(std::uint32_t record, std::int32_t left, std::int32_t right, std::int32_t top, std::int32_t bottom);
 
     Chunk& chunk_;
     const QueuedDraw& draw_;
@@ -76,14 +85,9 @@ class Assembler {
 double Assembler::bias(double slope, double largest_depth) const {
     const rhi::DepthStencilState& state = pipeline_.depth_stencil;
     if (state.depth_bias == 0.0f && state.depth_bias_slope == 0.0f) return 0.0;
-    double unit = 0.0;
-    switch (draw_.depth_layout) {
-        case DepthLayout::unorm16: unit = 0x1p-16; break;
-        case DepthLayout::unorm24: unit = 0x1p-24; break;
-        default:
-            unit = largest_depth > 0.0 ? std::ldexp(1.0, std::max(std::ilogb(largest_depth), -126) - 23) : 0.0;
-            break;
-    }
+    double unit = fixed_unit(draw_.depth_layout);
+    if (unit == 0.0 && largest_depth > 0.0)
+        unit = std::ldexp(1.0, std::max(std::ilogb(largest_depth), -126) - 23);
     double result = slope * state.depth_bias_slope + unit * state.depth_bias;
     if (state.depth_bias_clamp > 0.0f) result = std::min(result, static_cast<double>(state.depth_bias_clamp));
     if (state.depth_bias_clamp < 0.0f) result = std::max(result, static_cast<double>(state.depth_bias_clamp));
@@ -97,9 +101,7 @@ Assembler::Source Assembler::window_source(const SetupVertex& v0, const SetupVer
     double x1 = static_cast<double>(b.x) - a.x, y1 = static_cast<double>(b.y) - a.y;
     double x2 = static_cast<double>(c.x) - a.x, y2 = static_cast<double>(c.y) - a.y;
     const double area = x1 * y2 - x2 * y1;
-    // Twice the area, in pixels: below, the rounding of coordinates decides about the triangle.
-    constexpr double thin = 1.0 / 4096.0;
-    if (std::abs(area) < thin || (area > 0.0) != clockwise) {
+    if (std::abs(area) < thin_area || (area > 0.0) != clockwise) {
         constexpr double unit = 1.0 / subpixels;
         source.kind = PlaneSource::snapped;
         source.x0 = static_cast<float>(snapped.x[0] * unit), source.y0 = static_cast<float>(snapped.y[0] * unit);
@@ -145,10 +147,8 @@ bool Assembler::homogeneous_source(const SetupVertex (&vertices)[3], std::uint32
     return true;
 }
 
-void Assembler::bin(std::uint32_t record, std::int32_t low_x, std::int32_t high_x, std::int32_t low_y,
-                    std::int32_t high_y) {
-    const std::int32_t left = low_x / tile_size, right = high_x / tile_size;
-    const std::int32_t top = low_y / tile_size, bottom = high_y / tile_size;
+/// @param left  of the tiles that it touches; right and so on, inclusive
+void Assembler::bin(std::uint32_t record, std::int32_t left, std::int32_t right, std::int32_t top, std::int32_t bottom) {
     const auto across = static_cast<std::int32_t>(targets_.tiles_x);
     if (left == right && top == bottom) {
         scratch_.entries.push_back({static_cast<std::uint32_t>(top * across + left), record});
@@ -190,11 +190,55 @@ void Assembler::add(const Corners& corners, const Source& source, std::uint32_t 
     }
     record.primitive_id = source.primitive_id;
     record.bits = bits | draw_bits_ | static_cast<std::uint32_t>(source.kind) << Record::source_shift;
-    const auto bounded = [](double slope) { return std::abs(slope) < steepest ? static_cast<float>(slope) : 0.0f; };
+    const auto bounded = [](double slope) { return std::abs(slope) < steepest_slope ? static_cast<float>(slope) : 0.0f; };
     record.depth_c = bounded(source.depth.c), record.depth_dx = bounded(source.depth.dx);
     record.depth_dy = bounded(source.depth.dy);
     record.x0 = source.x0, record.y0 = source.y0;
-    bin(index, low_x, high_x, low_y, high_y);
+    bin(index, low_x / tile_size, high_x / tile_size, low_y / tile_size, high_y / tile_size);
+}
+
+void Assembler::triangles(const Segment& segment, const Kernels& kernels) {
+    const bool is_strip = pipeline_.topology == rhi::Topology::triangle_strip;
+    const std::vector<std::uint32_t>& locals = scratch_.locals;
+    const auto corner = [&](std::uint32_t number, std::uint32_t which) {
+        if (!is_strip) return locals[3 * std::size_t{number} + which];
+        const std::uint32_t odd = (segment.first_primitive + number) & 1;
+        return locals[number + (which == 0 ? 0 : which == 1 ? 1 + odd : 2 - odd)];
+    };
+    if (targets_.samples > 1 || pipeline_.fill != rhi::FillMode::fill) {
+        for (std::uint32_t i = 0; i < segment.primitive_count; ++i)
+            triangle(corner(i, 0), corner(i, 1), corner(i, 2), segment.first_primitive + i);
+        return;
+    }
+    const DrawPlan& plan = draw_.plan;
+    const rhi::DepthStencilState& state = pipeline_.depth_stencil;
+    TriangleSetup work;
+    work.vertices = scratch_.setup.data();
+    work.cull = pipeline_.cull;
+    work.front_is_clockwise = pipeline_.front_face == rhi::FrontFace::clockwise;
+    work.x_begin = plan.x_begin, work.x_end = plan.x_end, work.y_begin = plan.y_begin, work.y_end = plan.y_end;
+    work.bias = state.depth_bias, work.bias_slope = state.depth_bias_slope, work.bias_clamp = state.depth_bias_clamp;
+    work.bias_unit = fixed_unit(draw_.depth_layout);
+    work.draw_bits = draw_bits_;
+    for (std::uint32_t first = 0; first < segment.primitive_count; first += 16) {
+        work.count = std::min(segment.primitive_count - first, 16u);
+        for (std::uint32_t i = 0; i < 16; ++i)
+            for (std::uint32_t which = 0; which < 3; ++which)
+                work.locals[which][i] = corner(first + std::min(i, work.count - 1), which);
+        work.screen = chunk_.vertices.data();
+        work.first_primitive = segment.first_primitive + first;
+        kernels.set_up_triangles(work);
+        for (std::uint32_t rest = work.drawn | work.special; rest != 0; rest &= rest - 1) {
+            const auto i = static_cast<std::uint32_t>(std::countr_zero(rest));
+            if (work.special >> i & 1) {
+                triangle(work.locals[0][i], work.locals[1][i], work.locals[2][i], work.first_primitive + i);
+                continue;
+            }
+            const auto index = static_cast<std::uint32_t>(chunk_.records.size());
+            chunk_.records.push_back(work.records[i]);
+            bin(index, work.left[i], work.right[i], work.top[i], work.bottom[i]);
+        }
+    }
 }
 
 void Assembler::triangle(std::uint32_t local0, std::uint32_t local1, std::uint32_t local2, std::uint32_t primitive_id) {
@@ -494,24 +538,18 @@ void build_chunk(Chunk& chunk, const std::vector<std::unique_ptr<QueuedDraw>>& d
         run_vertices(segment, draw, kernels, lanes, chunk, scratch);
         Assembler assembler(chunk, draw, segment.draw, targets, scratch);
         const std::vector<std::uint32_t>& locals = scratch.locals;
+        const rhi::Topology topology = draw.pipeline->topology;
+        if (topology == rhi::Topology::triangle_list || topology == rhi::Topology::triangle_strip) {
+            assembler.triangles(segment, kernels);
+            continue;
+        }
         for (std::uint32_t i = 0; i < segment.primitive_count; ++i) {
             const std::uint32_t id = segment.first_primitive + i;
-            switch (draw.pipeline->topology) {
-                case rhi::Topology::point_list: assembler.point(locals[i], id); break;
-                case rhi::Topology::line_list:
-                    assembler.line(locals[2 * i], locals[2 * i + 1], locals[2 * i], id, true, false);
-                    break;
-                case rhi::Topology::line_strip:
-                    assembler.line(locals[i], locals[i + 1], locals[i], id, true, false);
-                    break;
-                case rhi::Topology::triangle_list:
-                    assembler.triangle(locals[3 * i], locals[3 * i + 1], locals[3 * i + 2], id);
-                    break;
-                case rhi::Topology::triangle_strip: {
-                    const std::uint32_t odd = id & 1;
-                    assembler.triangle(locals[i], locals[i + 1 + odd], locals[i + 2 - odd], id);
-                    break;
-                }
+            if (topology == rhi::Topology::point_list) {
+                assembler.point(locals[i], id);
+            } else {
+                const std::uint32_t first = topology == rhi::Topology::line_list ? 2 * i : i;
+                assembler.line(locals[first], locals[first + 1], locals[first], id, true, false);
             }
         }
     }

@@ -9,6 +9,9 @@
 namespace nacre::cpu::raster {
 namespace {
 
+/// Color targets of this size and more are written past the caches.
+constexpr std::uint64_t cached_color_bytes = 16 << 20;
+
 struct ChannelBits {
     std::uint32_t first, count;
 };
@@ -142,9 +145,20 @@ TargetSet target_set(const RenderTargets& targets) {
     for (std::uint32_t i = 0; i < set.color_count; ++i) {
         const ImageView& view = targets.colors[i];
         const ImageLevel& level = view.levels[0];
-        set.colors[i] = {level.data, level.sample_stride, level.row_stride, rhi::info(view.format).block_bytes,
-                         view.format};
+        const std::uint32_t bytes = rhi::info(view.format).block_bytes;
+        const std::uint32_t words = bytes < 4 ? 1 : bytes / 4;
+        set.colors[i] = {level.data, level.sample_stride, level.row_stride, bytes, view.format, words, set.color_planes,
+                         false,      {}};
+        if (i < targets.color_clears.size() && targets.color_clears[i] && level.data) {
+            set.colors[i].clears = true;
+            std::memcpy(set.colors[i].clear, targets.color_clears[i]->data(), bytes);
+        }
+        if (level.data) set.color_planes += words * set.samples;
     }
+    std::uint64_t color_bytes = 0;
+    for (std::uint32_t i = 0; i < set.color_count; ++i)
+        color_bytes += std::uint64_t{set.colors[i].texel_bytes} * set.width * set.height * set.samples;
+    set.streams_colors = color_bytes >= cached_color_bytes;
     const ImageView& view = targets.depth_stencil;
     switch (view.format) {
         case rhi::Format::d16_unorm: set.depth_layout = DepthLayout::unorm16; break;
@@ -157,10 +171,15 @@ TargetSet target_set(const RenderTargets& targets) {
     set.depth_row_stride = view.levels[0].row_stride;
     set.depth_sample_stride = view.levels[0].sample_stride;
     if (!set.depth) set.depth_layout = DepthLayout::none;
+    set.depth_clears = targets.depth_clear.has_value() && set.depth_layout != DepthLayout::none;
+    if (set.depth_clears)
+        std::memcpy(&set.clear_depth, targets.depth_clear->data(), set.depth_layout == DepthLayout::unorm16 ? 2 : 4);
     if (rhi::info(view.format).has_stencil) {
         set.stencil = view.stencil_levels[0].data;
         set.stencil_row_stride = view.stencil_levels[0].row_stride;
         set.stencil_sample_stride = view.stencil_levels[0].sample_stride;
+        set.stencil_clears = targets.stencil_clear.has_value() && set.stencil;
+        set.clear_stencil = targets.stencil_clear.value_or(0);
     }
     return set;
 }

@@ -23,10 +23,10 @@ const Kernels& choose_kernels(std::uint32_t limit) {
 namespace {
 
 /// A chunk is what one task takes through the first half: small enough that all threads get some, large enough that
-/// vertices are shared and bins pay.
-constexpr std::uint32_t chunk_primitives = 512;
-/// A slab goes through both halves together, which bounds memory; its vertices and records fit the last cache level.
-constexpr std::uint32_t slab_primitives = 32 * 1024;
+/// vertices are shared and bins pay: each tile looks at the bins of each chunk.
+constexpr std::uint32_t least_chunk_primitives = 512, most_chunk_primitives = 2048;
+/// A slab goes through both halves together, which bounds memory. Tiles take part in each slab anew.
+constexpr std::uint32_t slab_primitives = 64 * 1024;
 constexpr std::uint32_t slab_draws = 16 * 1024;
 static_assert(slab_draws <= most_draws);
 /// Vertex functions with side effects run once for each index as long as an instance is not larger than this.
@@ -52,11 +52,12 @@ struct Rasterizer::State {
 
     std::vector<ChunkScratch> scratch;
     std::vector<AlignedMemory> workspaces;
-    std::vector<AlignedMemory> primitive_memory;
+    std::vector<AlignedMemory> primitive_memory, color_memory;
     std::vector<ChunkView> views;
     std::vector<const DrawPlan*> plans;
     std::vector<std::uint32_t> busy_tiles;
     std::vector<std::uint8_t> tile_marks;
+    std::vector<std::uint8_t> uncleared;  ///< For each tile: whether what is to be cleared there still is to be.
 
     State(Scheduler& of_scheduler, std::uint32_t lane_count, const RasterizerOptions& of_options)
         : scheduler(of_scheduler),
@@ -65,7 +66,8 @@ struct Rasterizer::State {
           kernels(choose_kernels(of_options.instruction_set)),
           scratch(of_scheduler.thread_count()),
           workspaces(of_scheduler.thread_count()),
-          primitive_memory(of_scheduler.thread_count()) {
+          primitive_memory(of_scheduler.thread_count()),
+          color_memory(of_scheduler.thread_count()) {
         for (AlignedMemory& memory : workspaces) {
             memory.reserve(sizeof(Workspace), 0);
             std::memset(memory.data(), 0, sizeof(Workspace));
@@ -74,7 +76,7 @@ struct Rasterizer::State {
 
     Workspace& workspace(std::uint32_t thread) { return *reinterpret_cast<Workspace*>(workspaces[thread].data()); }
 
-    Chunk& open_chunk() {
+    Chunk& open_chunk(std::uint32_t chunk_primitives) {
         if (chunk_count == 0 || chunks[chunk_count - 1]->primitive_count >= chunk_primitives) {
             if (chunk_count == chunks.size()) chunks.push_back(std::make_unique<Chunk>());
             Chunk& chunk = *chunks[chunk_count++];
@@ -97,8 +99,10 @@ struct Rasterizer::State {
         if (count == 0 || call.instance_count == 0 || !pipeline.vertex.run || targets.tiles_x == 0 ||
             targets.tiles_y == 0)
             return;
-        if (draw_count == slab_draws) flush();
+        if (draw_count == slab_draws) flush(false);
         std::uint32_t index = enqueue(state, call);
+        const std::uint32_t chunk_primitives = std::clamp(
+            count / (8 * scheduler.thread_count()), least_chunk_primitives, most_chunk_primitives);
         const bool whole = pipeline.vertex.has_side_effects && count <= largest_whole_instance;
         for (std::uint32_t instance = 0; instance < call.instance_count; ++instance) {
             for (std::uint32_t first = 0; first < count;) {
@@ -107,10 +111,10 @@ struct Rasterizer::State {
                         discard_queue();
                         return;
                     }
-                    flush();
+                    flush(false);
                     index = enqueue(state, call);
                 }
-                Chunk& chunk = open_chunk();
+                Chunk& chunk = open_chunk(chunk_primitives);
                 const std::uint32_t room = whole ? count : chunk_primitives - chunk.primitive_count;
                 const std::uint32_t part = std::min(count - first, room);
                 chunk.segments.push_back({index, call.first_instance + instance, first, part});
@@ -131,8 +135,10 @@ struct Rasterizer::State {
             scheduler.run(count, task);
     }
 
-    void flush() {
-        if (chunk_count == 0) {
+    /// Carries out what is queued; at the end of the pass also the clears of tiles that nothing was drawn to.
+    void flush(bool ends_pass) {
+        const bool clears = ends_pass && std::ranges::find(uncleared, 1) != uncleared.end();
+        if (chunk_count == 0 && !clears) {
             draw_count = 0;
             return;
         }
@@ -156,7 +162,7 @@ struct Rasterizer::State {
         }
         busy_tiles.clear();
         for (std::uint32_t tile = 0; tile < tile_count; ++tile)
-            if (all_tiles || tile_marks[tile]) busy_tiles.push_back(tile);
+            if (all_tiles || tile_marks[tile] || (clears && uncleared[tile])) busy_tiles.push_back(tile);
         if (options.tile_order) std::ranges::shuffle(busy_tiles, std::minstd_rand(*options.tile_order + 1));
 
         std::size_t primitive_bytes = sizeof(PrimitiveData);
@@ -168,12 +174,16 @@ struct Rasterizer::State {
         for (std::uint32_t thread = 0; thread < primitive_memory.size(); ++thread) {
             primitive_memory[thread].reserve(primitive_bytes * primitive_slots, 0);
             workspace(thread).primitives = primitive_memory[thread].data();
+            color_memory[thread].reserve(std::size_t{targets.color_planes} * tile_pixels * sizeof(std::uint32_t), 0);
+            workspace(thread).colors = reinterpret_cast<std::uint32_t*>(color_memory[thread].data());
         }
         const TileJob job{&targets,     views.data(), static_cast<std::uint32_t>(views.size()),
-                          plans.data(), lanes,        &srgb_tables()};
+                          plans.data(), lanes,        &srgb_tables(),
+                          uncleared.data()};
         run(static_cast<std::uint32_t>(busy_tiles.size()), [&](std::uint32_t index, std::uint32_t thread) {
             kernels.draw_tile(job, busy_tiles[index], workspace(thread));
         });
+        for (const std::uint32_t tile : busy_tiles) uncleared[tile] = 0;
         discard_queue();
     }
 };
@@ -184,17 +194,20 @@ Rasterizer::~Rasterizer() = default;
 
 void Rasterizer::begin_pass(const RenderTargets& targets) {
     state_->discard_queue();
-    state_->targets = target_set(targets);
+    const TargetSet& set = state_->targets = target_set(targets);
+    const bool clears = set.depth_clears || set.stencil_clears ||
+                        std::any_of(set.colors, set.colors + set.color_count, [](const auto& at) { return at.clears; });
+    state_->uncleared.assign(std::size_t{set.tiles_x} * set.tiles_y, clears ? 1 : 0);
     for (std::uint32_t thread = 0; thread < state_->workspaces.size(); ++thread)
         state_->workspace(thread).passed_samples = 0;
 }
 
 void Rasterizer::draw(const DrawState& state, const DrawCall& call) { state_->draw(state, call); }
 
-void Rasterizer::end_pass() { state_->flush(); }
+void Rasterizer::end_pass() { state_->flush(true); }
 
 std::uint64_t Rasterizer::passed_samples() {
-    state_->flush();
+    state_->flush(false);
     std::uint64_t sum = 0;
     for (std::uint32_t thread = 0; thread < state_->workspaces.size(); ++thread)
         sum += state_->workspace(thread).passed_samples;

@@ -40,6 +40,11 @@ struct RenderTargets {
     std::vector<ImageView> colors;
     ImageView depth_stencil{};  ///< format undefined: none.
     std::uint32_t width = 0, height = 0, samples = 1;
+    // Bytes of a texel that a target is filled with before the first draw; the fill is finished when the pass ends. Nothing:
+    // it keeps what it holds. `color_clears` may be shorter than `colors`.
+    std::vector<std::optional<std::array<std::byte, 16>>> color_clears;
+    std::optional<std::array<std::byte, 4>> depth_clear;
+    std::optional<std::uint8_t> stencil_clear;
 };
 
 struct DrawState {
@@ -85,7 +90,7 @@ class Rasterizer {
 
     void begin_pass(const RenderTargets& targets);
     void draw(const DrawState& state, const DrawCall& call);
-    /// All draws of the pass are finished, and their writes in the targets, when this returns.
+    /// All draws and fills of the pass are finished, and their writes in the targets, when this returns.
     void end_pass();
     /// Samples that passed depth and stencil tests since the begin of the pass, all draws so far finished.
     std::uint64_t passed_samples();

@@ -146,6 +146,13 @@ NACRE_LANES_INLINE Ints shift_right(const Ints& a, int count) {
         (IntRegister)((UintRegister)a.part[i] >> (UintRegister{} + static_cast<std::uint32_t>(count)));
     return result;
 }
+template <int count>
+NACRE_LANES_INLINE Ints shift_right_signed(const Ints& a) {
+    Ints result;
+    NACRE_EACH result.part[i] = a.part[i] >> count;
+    return result;
+}
+alignas(64) constexpr std::int32_t lane_numbers[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 NACRE_LANES_INLINE Floats to_floats(const Ints& a) {
     Floats result;
     NACRE_EACH result.part[i] = __builtin_convertvector(a.part[i], FloatRegister);
@@ -250,11 +257,41 @@ NACRE_LANES_INLINE Floats select(const Lanes& which, const Floats& a, const Floa
 #endif
 
 NACRE_LANES_INLINE Lanes less(const Floats& a, float b) { return less(a, floats(b)); }
-/// `a` where it is below `b`; `b` where `a` is not a number.
-NACRE_LANES_INLINE Floats minimum(const Floats& a, const Floats& b) { return select(less(a, b), a, b); }
-NACRE_LANES_INLINE Floats maximum(const Floats& a, const Floats& b) { return select(less(b, a), a, b); }
+// `a` where it is below (above) `b`; `b` where one is not a number, and of two zeros. That is what the instructions of
+// x86 do.
+#if defined(__AVX512F__)
+NACRE_LANES_INLINE Floats minimum(const Floats& a, const Floats& b) { return {_mm512_min_ps(a.part[0], b.part[0])}; }
+NACRE_LANES_INLINE Floats maximum(const Floats& a, const Floats& b) { return {_mm512_max_ps(a.part[0], b.part[0])}; }
+NACRE_LANES_INLINE Ints minimum(const Ints& a, const Ints& b) {
+    return {(IntRegister)_mm512_min_epi32((__m512i)a.part[0], (__m512i)b.part[0])};
+}
+NACRE_LANES_INLINE Ints maximum(const Ints& a, const Ints& b) {
+    return {(IntRegister)_mm512_max_epi32((__m512i)a.part[0], (__m512i)b.part[0])};
+}
+#else
+#if defined(__AVX2__)
+NACRE_LANES_INLINE FloatRegister minimum(FloatRegister a, FloatRegister b) { return _mm256_min_ps(a, b); }
+NACRE_LANES_INLINE FloatRegister maximum(FloatRegister a, FloatRegister b) { return _mm256_max_ps(a, b); }
+#elif defined(__x86_64__)
+NACRE_LANES_INLINE FloatRegister minimum(FloatRegister a, FloatRegister b) { return _mm_min_ps(a, b); }
+NACRE_LANES_INLINE FloatRegister maximum(FloatRegister a, FloatRegister b) { return _mm_max_ps(a, b); }
+#else
+NACRE_LANES_INLINE FloatRegister minimum(FloatRegister a, FloatRegister b) { return a < b ? a : b; }
+NACRE_LANES_INLINE FloatRegister maximum(FloatRegister a, FloatRegister b) { return b < a ? a : b; }
+#endif
+NACRE_LANES_INLINE Floats minimum(const Floats& a, const Floats& b) {
+    Floats result;
+    NACRE_EACH result.part[i] = minimum(a.part[i], b.part[i]);
+    return result;
+}
+NACRE_LANES_INLINE Floats maximum(const Floats& a, const Floats& b) {
+    Floats result;
+    NACRE_EACH result.part[i] = maximum(a.part[i], b.part[i]);
+    return result;
+}
 NACRE_LANES_INLINE Ints minimum(const Ints& a, const Ints& b) { return select(less(a, b), a, b); }
 NACRE_LANES_INLINE Ints maximum(const Ints& a, const Ints& b) { return select(less(b, a), a, b); }
+#endif
 /// In [low, high]; `low` where `a` is not a number.
 NACRE_LANES_INLINE Floats clamp(const Floats& a, float low, float high) {
     return minimum(maximum(a, floats(low)), floats(high));
@@ -263,9 +300,10 @@ NACRE_LANES_INLINE Floats absolute(const Floats& a) { return floats_of_bits(bits
 
 #undef NACRE_EACH
 
-/// Four floats, as the rows of a vertex or plane.
+/// Four floats or integers, as the rows of a vertex or plane, or the pixels of a quad.
 using Float4 [[gnu::vector_size(16)]] = float;
 using Int4 [[gnu::vector_size(16)]] = std::int32_t;
+using Long2 [[gnu::vector_size(16)]] = std::int64_t;
 
 NACRE_LANES_INLINE Float4 load4(const float* from) {
     Float4 result;
@@ -273,13 +311,31 @@ NACRE_LANES_INLINE Float4 load4(const float* from) {
     return result;
 }
 NACRE_LANES_INLINE void store4(float* to, Float4 value) { std::memcpy(to, &value, sizeof(value)); }
+NACRE_LANES_INLINE Int4 load4(const void* from) {
+    Int4 result;
+    std::memcpy(&result, from, sizeof(result));
+    return result;
+}
+NACRE_LANES_INLINE void store4(void* to, Int4 value) { std::memcpy(to, &value, sizeof(value)); }
+/// Past the caches, which need not read the rest of the line then; seen by others after `end_streams`. Aligned to 16 bytes.
+NACRE_LANES_INLINE void stream4(void* to, Int4 value) {
+#if defined(__x86_64__)
+    _mm_stream_si128(static_cast<__m128i*>(to), (__m128i)value);
+#else
+    store4(to, value);
+#endif
+}
+NACRE_LANES_INLINE void end_streams() {
+#if defined(__x86_64__)
+    _mm_sfence();
+#endif
+}
 
 /// Rows become columns.
-NACRE_LANES_INLINE void transpose(Float4& a, Float4& b, Float4& c, Float4& d) {
-    const Float4 ab_low = __builtin_shufflevector(a, b, 0, 4, 1, 5),
-                 ab_high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
-    const Float4 cd_low = __builtin_shufflevector(c, d, 0, 4, 1, 5),
-                 cd_high = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+template <typename Row>
+NACRE_LANES_INLINE void transpose(Row& a, Row& b, Row& c, Row& d) {
+    const Row ab_low = __builtin_shufflevector(a, b, 0, 4, 1, 5), ab_high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    const Row cd_low = __builtin_shufflevector(c, d, 0, 4, 1, 5), cd_high = __builtin_shufflevector(c, d, 2, 6, 3, 7);
     a = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
     b = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
     c = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);

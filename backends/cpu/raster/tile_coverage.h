@@ -39,11 +39,12 @@ struct Coverage {
 
     TileRun& run;
     // Edges that cross the tile inside of the triangle's bounds; the others are inside everywhere there.
-    std::int32_t a[3] = {}, b[3] = {}, e[3][samples] = {};
+    std::int32_t a[4], b[4], e[samples][4];
     std::uint32_t edges = 0;
     std::int32_t x0, x1, y0, y1;  ///< Pixels of the tile, inclusive.
     bool bounded = false;         ///< Blocks may stick out of these without an edge that says so.
-    Ints steps[3];                ///< Edge function of each lane less that of the block's first.
+
+    explicit Coverage(TileRun& of_run) : run(of_run) {}
 
     /// @return whether anything may be covered
     bool set_up() {
@@ -94,22 +95,35 @@ struct Coverage {
                 continue;
             }
             a[edges] = edge_a, b[edges] = edge_b;
-            for (std::uint32_t s = 0; s < samples; ++s) e[edges][s] = static_cast<std::int32_t>(values[s]);
+            for (std::uint32_t s = 0; s < samples; ++s) e[s][edges] = static_cast<std::int32_t>(values[s]);
             ++edges;
         }
-        for (std::uint32_t i = 0; i < 3; ++i) steps[i] = ints(a[i]) * load(lane_x) + ints(b[i]) * load(lane_y);
         return true;
     }
 
-    /// Lanes of the block that sample `s` covers, by the edges alone.
+    /// Edge functions of a row of blocks, block by block.
     template <int edge_count>
-    [[gnu::always_inline]] std::uint32_t covered(std::int32_t block_x, std::int32_t block_y, std::uint32_t s) const {
-        Ints inside = steps[0] + ints(e[0][s] + a[0] * (4 * block_x) + b[0] * (4 * block_y));
-        if constexpr (edge_count > 1)
-            inside = inside | (steps[1] + ints(e[1][s] + a[1] * (4 * block_x) + b[1] * (4 * block_y)));
-        if constexpr (edge_count > 2)
-            inside = inside | (steps[2] + ints(e[2][s] + a[2] * (4 * block_x) + b[2] * (4 * block_y)));
-        return mask_of(not_negative(inside));
+    struct Walk {
+        Ints values[edge_count > 0 ? edge_count : 1];
+        NACRE_LANES_INLINE void next(const Ints* steps) {
+            for (int i = 0; i < edge_count; ++i) values[i] = values[i] + steps[i];
+        }
+        /// Lanes inside of all edges.
+        [[nodiscard]] NACRE_LANES_INLINE std::uint32_t covered() const {
+            if constexpr (edge_count == 0) return 0xffff;
+            Ints inside = values[0];
+            for (int i = 1; i < edge_count; ++i) inside = inside | values[i];
+            return mask_of(not_negative(inside));
+        }
+    };
+    template <int edge_count>
+    [[gnu::always_inline]] Walk<edge_count> walk_from(std::int32_t block_x, std::int32_t block_y,
+                                                      std::uint32_t s) const {
+        Walk<edge_count> walk;
+        for (int i = 0; i < edge_count; ++i)
+            walk.values[i] = ints(a[i]) * load(lane_x) + ints(b[i]) * load(lane_y) +
+                             ints(e[s][i] + a[i] * (4 * block_x) + b[i] * (4 * block_y));
+        return walk;
     }
 
     /// The frequent case: one sample, depth tested before the fragment function or not at all, no stencil.
@@ -117,40 +131,40 @@ struct Coverage {
     void run_simple_blocks(std::int32_t first_x, std::int32_t last_x, std::int32_t first_y, std::int32_t last_y) {
         const Record& record = *run.record;
         const DrawPlan& draw = *run.draw;
-        const rhi::CompareOperation operation = draw.depth_stencil.compare;
         const bool shades = draw.shades, tests = run.depth != nullptr, writes = draw.depth_stencil.depth_write;
+        const DepthLayout layout = run.targets.depth_layout;
         const Floats plane_c = floats(record.depth_c), plane_dx = floats(record.depth_dx), from_x = floats(record.x0);
-        const Floats center_x = to_floats(load(lane_x)) + floats(static_cast<float>(run.tile_x) + 0.5f);
+        const Floats center_x = to_floats(load(lane_x)) + floats(static_cast<float>(run.tile_x + 4 * first_x) + 0.5f);
         const Floats center_y = to_floats(load(lane_y)) + floats(static_cast<float>(run.tile_y) + 0.5f);
+        Walk<edge_count> row = walk_from<edge_count>(first_x, first_y, 0);
+        Ints across[edge_count > 0 ? edge_count : 1], down[edge_count > 0 ? edge_count : 1];
+        for (int i = 0; i < edge_count; ++i) across[i] = ints(4 * a[i]), down[i] = ints(4 * b[i]);
         std::uint32_t passed = 0;
-        for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y) {
+        for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y, row.next(down)) {
             // As in TileRun::depth_at; what is the same in a row of blocks is computed once.
             const Floats along_y =
                 floats(record.depth_dy) * (center_y + floats(static_cast<float>(4 * block_y)) - floats(record.y0));
-            for (std::int32_t block_x = first_x; block_x <= last_x; ++block_x) {
-                std::uint32_t mask = bounded ? lanes_inside(block_x, block_y, x0, x1, y0, y1) : 0xffff;
-                if constexpr (edge_count > 0) mask &= covered<edge_count>(block_x, block_y, 0);
+            Walk<edge_count> walk = row;
+            Floats x = center_x;
+            for (std::int32_t block_x = first_x; block_x <= last_x;
+                 ++block_x, walk.next(across), x = x + floats(4.0f)) {
+                std::uint32_t mask = walk.covered();
+                if (bounded) mask &= lanes_inside(block_x, block_y, x0, x1, y0, y1);
                 if (mask == 0) continue;
                 const std::uint32_t place = block_place(block_x, block_y);
                 if (tests) {
-                    const Floats x = center_x + floats(static_cast<float>(4 * block_x));
-                    const Ints key = depth_key(run.targets.depth_layout, plane_c + plane_dx * (x - from_x) + along_y,
-                                               run.depth_low, run.depth_high);
+                    const Ints key = depth_key(layout, plane_c + plane_dx * (x - from_x) + along_y, run.depth_low,
+                                               run.depth_high);
                     std::int32_t* const depth = run.memory.depth[0] + place;
                     const Ints old = load(depth);
-                    mask &= mask_of(operation == rhi::CompareOperation::less            ? less(key, old)
-                                    : operation == rhi::CompareOperation::less_or_equal ? ~less(old, key)
-                                                                                        : compare(operation, key, old));
+                    const Lanes passes = lanes_of(mask) & compare(draw.depth_stencil.compare, key, old);
+                    mask = mask_of(passes);
+                    if (writes) store(depth, select(passes, key, old));
+                    if (writes && mask != 0) run.depth_written(place);
                     if (mask == 0) continue;
-                    if (writes) {
-                        store(depth, select(lanes_of(mask), key, old));
-                        run.depth_written(place);
-                    }
                 }
                 passed += static_cast<std::uint32_t>(__builtin_popcount(mask));
-                if (shades)
-                    run.append_block(0, run.tile_x + 4 * block_x, run.tile_y + 4 * block_y, place, mask, nullptr,
-                                     nullptr);
+                if (shades) run.append_block(0, place, mask, nullptr, nullptr);
             }
         }
         run.memory.passed_samples += passed;
@@ -164,18 +178,23 @@ struct Coverage {
                 return;
             }
         }
-        for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y)
+        Ints across[edge_count > 0 ? edge_count : 1];
+        for (int i = 0; i < edge_count; ++i) across[i] = ints(4 * a[i]);
+        for (std::int32_t block_y = first_y; block_y <= last_y; ++block_y) {
+            Walk<edge_count> walks[samples];
+            for (std::uint32_t s = 0; s < samples; ++s) walks[s] = walk_from<edge_count>(first_x, block_y, s);
             for (std::int32_t block_x = first_x; block_x <= last_x; ++block_x) {
                 const std::uint32_t limit = bounded ? lanes_inside(block_x, block_y, x0, x1, y0, y1) : 0xffff;
                 std::uint32_t masks[samples];
                 std::uint32_t any = 0;
                 for (std::uint32_t s = 0; s < samples; ++s) {
-                    masks[s] = limit;
-                    if constexpr (edge_count > 0) masks[s] &= covered<edge_count>(block_x, block_y, s);
+                    masks[s] = limit & walks[s].covered();
+                    walks[s].next(across);
                     any |= masks[s];
                 }
                 if (any) shade_block(block_x, block_y, masks);
             }
+        }
     }
     void run_blocks(std::uint32_t edge_count, std::int32_t first_x, std::int32_t last_x, std::int32_t first_y,
                     std::int32_t last_y) {
@@ -192,45 +211,114 @@ struct Coverage {
     /// @return whether it was one
     [[gnu::always_inline]] bool draw_small() {
         const Record& record = *run.record;
-        Int4 x, y;
-        std::memcpy(&x, record.x, sizeof(x)), std::memcpy(&y, record.y, sizeof(y));
         // The fourth lanes hold something else.
-        x = __builtin_shufflevector(x, x, 0, 1, 2, 0) - (run.tile_x * subpixels + subpixels / 2);
-        y = __builtin_shufflevector(y, y, 0, 1, 2, 0) - (run.tile_y * subpixels + subpixels / 2);
+        const Int4 all_x = load4(record.x), all_y = load4(record.y);
+        const Int4 x = __builtin_shufflevector(all_x, all_x, 0, 1, 2, 0) - (run.tile_x * subpixels + subpixels / 2);
+        const Int4 y = __builtin_shufflevector(all_y, all_y, 0, 1, 2, 0) - (run.tile_y * subpixels + subpixels / 2);
         const auto lesser = [](Int4 one, Int4 other) { return one < other ? one : other; };
         const auto greater = [](Int4 one, Int4 other) { return one > other ? one : other; };
         const auto turned = [](Int4 all) { return __builtin_shufflevector(all, all, 1, 2, 0, 1); };
-        const Int4 next_x = turned(x), next_y = turned(y);
-        const std::int32_t low_x = lesser(lesser(x, next_x), turned(next_x))[0],
-                           high_x = greater(greater(x, next_x), turned(next_x))[0];
-        const std::int32_t low_y = lesser(lesser(y, next_y), turned(next_y))[0],
-                           high_y = greater(greater(y, next_y), turned(next_y))[0];
-        if (high_x - low_x > 32 * subpixels || high_y - low_y > 32 * subpixels) return false;
-        const DrawPlan& draw = *run.draw;
-        const auto cut = [&](std::int32_t low, std::int32_t high, std::int32_t begin, std::int32_t end,
-                             std::int32_t size, std::int32_t& first, std::int32_t& last) {
-            begin = begin > 0 ? begin : 0, end = end < size ? end : size;
-            first = (low + subpixels - 1) >> subpixel_bits, last = high >> subpixel_bits;
-            bounded |= (first < begin) | (last >= end);
-            first = first < begin ? begin : first, last = last < end ? last : end - 1;
-        };
-        cut(low_x, high_x, draw.x_begin - run.tile_x, draw.x_end - run.tile_x, run.width, x0, x1);
-        cut(low_y, high_y, draw.y_begin - run.tile_y, draw.y_end - run.tile_y, run.height, y0, y1);
+        // First x and y and, with all bits turned, last x and y: the least of each. Pixels with a center in between.
+        const Int4 corners = __builtin_shufflevector(x, y, 0, 4, 1, 5), turn = {0, 0, -1, -1};
+        const Int4 corner0 = __builtin_shufflevector(corners, corners, 0, 1, 0, 1) ^ turn;
+        const Int4 corner1 = __builtin_shufflevector(corners, corners, 2, 3, 2, 3) ^ turn;
+        const Int4 corner2 = __builtin_shufflevector(x, y, 2, 6, 2, 6) ^ turn;
+        const Int4 bounds =
+            (lesser(lesser(corner0, corner1), corner2) + Int4{subpixels - 1, subpixels - 1, 0, 0}) >> subpixel_bits;
+        if (~bounds[2] - bounds[0] > 31 || ~bounds[3] - bounds[1] > 31) return false;
+        const Int4 cut = greater(bounds, load4(run.limits));
+        x0 = cut[0], y0 = cut[1], x1 = ~cut[2], y1 = ~cut[3];
         if (x0 > x1 || y0 > y1) return true;
+        const auto changes = (Long2)(cut ^ bounds);
+        bounded = (changes[0] | changes[1]) != 0;
+        const DrawPlan& draw = *run.draw;
         const std::int32_t region_x = x0 / 16, region_y = y0 / 16;
         if (draw.hierarchical && run.depth && region_x == x1 / 16 && region_y == y1 / 16 &&
             run.hidden(region_x, region_y, x0, x1, y0, y1))
             return true;
 
+        const Int4 next_x = turned(x), next_y = turned(y);
         const Int4 edge_a = y - next_y, edge_b = next_x - x;
         const Int4 owns_border = (edge_a > 0) | ((edge_a == 0) & (edge_b > 0));
         const Int4 value = (-1 - owns_border - edge_a * x - edge_b * y) >> subpixel_bits;
-        for (int i = 0; i < 3; ++i) {
-            a[i] = edge_a[i], b[i] = edge_b[i], e[i][0] = value[i];
-            steps[i] = ints(a[i]) * load(lane_x) + ints(b[i]) * load(lane_y);
+        const std::int32_t first_x = x0 / 4, last_x = x1 / 4, first_y = y0 / 4, last_y = y1 / 4;
+        if (run.simple_depth && run.depth && !bounded && last_x - first_x <= 1 && last_y - first_y <= 1) {
+            run_four_blocks(edge_a, edge_b, value, first_x, last_x, first_y, last_y);
+            return true;
         }
-        run_blocks<3>(x0 / 4, x1 / 4, y0 / 4, y1 / 4);
+        store4(a, edge_a), store4(b, edge_b), store4(e[0], value);
+        run_blocks<3>(first_x, last_x, first_y, last_y);
         return true;
+    }
+
+    /// As run_simple_blocks, for two by two blocks and with a depth test: without loops, and with hardly a branch that the
+    /// processor could guess wrong. Where there is only one row or column, what is done for the other changes nothing;
+    /// the memory of depth goes on behind that of the first sample.
+    [[gnu::always_inline]] void run_four_blocks(Int4 edge_a, Int4 edge_b, Int4 value, std::int32_t first_x,
+                                                std::int32_t last_x, std::int32_t first_y, std::int32_t last_y) {
+        const Record& record = *run.record;
+        const DrawPlan& draw = *run.draw;
+        alignas(16) std::int32_t along_x[4], along_y[4], right[4], down[4], origin[4];
+        store4(along_x, edge_a), store4(along_y, edge_b), store4(right, edge_a * 4), store4(down, edge_b * 4);
+        store4(origin, value + edge_a * (4 * first_x) + edge_b * (4 * first_y));
+        Ints edges_at[4];
+        for (int i = 0; i < 3; ++i) {
+            const Ints first =
+                ints(along_x[i]) * load(lane_x) + ints(along_y[i]) * load(lane_y) + ints(origin[i]);
+            const Ints second = first + ints(right[i]);
+            const Ints third = first + ints(down[i]), fourth = second + ints(down[i]);
+            edges_at[0] = i == 0 ? first : edges_at[0] | first;
+            edges_at[1] = i == 0 ? second : edges_at[1] | second;
+            edges_at[2] = i == 0 ? third : edges_at[2] | third;
+            edges_at[3] = i == 0 ? fourth : edges_at[3] | fourth;
+        }
+        // As in TileRun::depth_at.
+        const Floats x = to_floats(load(lane_x)) + floats(static_cast<float>(run.tile_x + 4 * first_x) + 0.5f);
+        const Floats y = to_floats(load(lane_y)) + floats(static_cast<float>(run.tile_y + 4 * first_y) + 0.5f);
+        const Floats c = floats(record.depth_c), dx = floats(record.depth_dx), dy = floats(record.depth_dy);
+        const Floats from_x = floats(record.x0), from_y = floats(record.y0);
+        const Floats in_x[2] = {c + dx * (x - from_x), c + dx * (x + floats(4.0f) - from_x)};
+        const Floats in_y[2] = {dy * (y - from_y), dy * (y + floats(4.0f) - from_y)};
+        const std::uint32_t place = block_place(first_x, first_y);
+        std::int32_t* const depth = &run.memory.depth[0][0] + place;
+        const DepthLayout layout = run.targets.depth_layout;
+        Ints keys[4], old[4];
+        for (int i = 0; i < 4; ++i) {
+            keys[i] = depth_key(layout, in_x[i & 1] + in_y[i >> 1], run.depth_low, run.depth_high);
+            old[i] = load(depth + four_blocks[i]);
+        }
+        Lanes passes[4];
+        const auto test = [&](auto&& comparison) {
+            for (int i = 0; i < 4; ++i) passes[i] = not_negative(edges_at[i]) & comparison(keys[i], old[i]);
+        };
+        switch (draw.depth_stencil.compare) {
+            case rhi::CompareOperation::less: test([](Ints key, Ints at) { return less(key, at); }); break;
+            case rhi::CompareOperation::less_or_equal: test([](Ints key, Ints at) { return ~less(at, key); }); break;
+            case rhi::CompareOperation::greater: test([](Ints key, Ints at) { return less(at, key); }); break;
+            case rhi::CompareOperation::greater_or_equal: test([](Ints key, Ints at) { return ~less(key, at); }); break;
+            case rhi::CompareOperation::equal: test([](Ints key, Ints at) { return equal(key, at); }); break;
+            default: test([&](Ints key, Ints at) { return compare(draw.depth_stencil.compare, key, at); }); break;
+        }
+        std::uint32_t masks[4];
+        for (int i = 0; i < 4; ++i) masks[i] = mask_of(passes[i]);
+        if (draw.depth_stencil.depth_write) {
+            for (int i = 0; i < 4; ++i) store(depth + four_blocks[i], select(passes[i], keys[i], old[i]));
+            const auto note = [&](std::int32_t row, std::uint32_t left_block, std::uint32_t right_block) {
+                const std::uint32_t bits = (left_block != 0 ? 1u : 0u) | (right_block != 0 ? 2u : 0u);
+                run.written_blocks[row] = static_cast<std::uint16_t>(run.written_blocks[row] | bits << first_x);
+            };
+            note(first_y, masks[0], masks[1]), note(first_y + 1, masks[2], masks[3]);
+        }
+        const std::uint64_t both[2] = {masks[0] | static_cast<std::uint64_t>(masks[1]) << 32,
+                                       masks[2] | static_cast<std::uint64_t>(masks[3]) << 32};
+        const std::uint64_t all = both[0] | both[1] << 16;
+        if (all == 0) return;
+        run.memory.passed_samples += static_cast<std::uint32_t>(__builtin_popcountll(all));
+        if (!draw.shades) return;
+        const std::uint32_t columns = 1u << first_x / region_blocks | 1u << last_x / region_blocks;
+        run.append_four_blocks(place, masks,
+                               columns << first_y / region_blocks * regions_across |
+                                   columns << last_y / region_blocks * regions_across);
     }
 
     void draw_triangle() {
@@ -249,23 +337,26 @@ struct Coverage {
             for (std::int32_t x = region_x; x <= x1 / 16; ++x) {
                 const std::int32_t left = x * 16 > x0 ? x * 16 : x0, right = x * 16 + 15 < x1 ? x * 16 + 15 : x1;
                 const std::int32_t top = y * 16 > y0 ? y * 16 : y0, bottom = y * 16 + 15 < y1 ? y * 16 + 15 : y1;
-                std::uint32_t crossing = 0;
+                // The edges that cross this region, in front of all others.
+                Coverage part = *this;
+                part.edges = 0;
                 bool outside = false;
                 for (std::uint32_t i = 0; i < edges; ++i) {
-                    std::int32_t low = e[i][0], high = e[i][0];
+                    std::int32_t low = e[0][i], high = e[0][i];
                     for (std::uint32_t s = 1; s < samples; ++s) {
-                        low = e[i][s] < low ? e[i][s] : low, high = e[i][s] > high ? e[i][s] : high;
+                        low = e[s][i] < low ? e[s][i] : low, high = e[s][i] > high ? e[s][i] : high;
                     }
                     low += a[i] * (a[i] < 0 ? right : left) + b[i] * (b[i] < 0 ? bottom : top);
                     high += a[i] * (a[i] < 0 ? left : right) + b[i] * (b[i] < 0 ? top : bottom);
                     outside |= high < 0;
-                    crossing += low < 0;
+                    if (low >= 0) continue;
+                    part.a[part.edges] = a[i], part.b[part.edges] = b[i];
+                    for (std::uint32_t s = 0; s < samples; ++s) part.e[s][part.edges] = e[s][i];
+                    ++part.edges;
                 }
                 if (outside || (rejects && run.hidden(x, y, left, right, top, bottom))) continue;
-                const bool was_bounded = bounded;
-                bounded = bounded || crossing == 0;
-                run_blocks(crossing == 0 ? 0 : edges, left / 4, right / 4, top / 4, bottom / 4);
-                bounded = was_bounded;
+                part.bounded = bounded || part.edges < edges;
+                part.run_blocks(part.edges, left / 4, right / 4, top / 4, bottom / 4);
             }
     }
 
@@ -301,7 +392,7 @@ struct Coverage {
         }
         if (any == 0 || !draw.shades) return;
         if constexpr (!multisampled) {
-            run.append_block(0, x, y, place, any, nullptr, nullptr);
+            run.append_block(0, place, any, nullptr, nullptr);
         } else {
             std::uint8_t covered_samples[16] = {}, alive_samples[16] = {};
             for (std::uint32_t s = 0; s < samples; ++s)
@@ -311,10 +402,10 @@ struct Coverage {
                     alive_samples[lane] = static_cast<std::uint8_t>(alive_samples[lane] | (alive[s] >> lane & 1) << s);
                 }
             if (!draw.runs_per_sample) {
-                run.append_block(0, x, y, place, any, covered_samples, alive_samples);
+                run.append_block(0, place, any, covered_samples, alive_samples);
             } else {
                 for (std::uint32_t s = 0; s < samples; ++s)
-                    if (alive[s]) run.append_block(s, x, y, place, alive[s], nullptr, nullptr);
+                    if (alive[s]) run.append_block(s, place, alive[s], nullptr, nullptr);
             }
         }
     }

@@ -17,7 +17,8 @@
 
 namespace nacre::cpu::raster {
 
-inline constexpr std::int32_t tile_size = 64;    ///< Pixels, both ways.
+inline constexpr int tile_bits = 6;
+inline constexpr std::int32_t tile_size = 1 << tile_bits;  ///< Pixels, both ways.
 inline constexpr std::int32_t tile_blocks = 16;  ///< Blocks of 4x4 pixels in a row of a tile.
 inline constexpr std::int32_t tile_pixels = tile_size * tile_size;
 inline constexpr std::int32_t subpixel_bits = 8;
@@ -106,10 +107,16 @@ struct ColorTarget {
     std::uint64_t sample_stride;
     std::uint32_t row_stride, texel_bytes;
     rhi::Format format;
+    std::uint32_t words;        ///< Of a texel in Workspace::colors: one for each 32 bits, one for less.
+    std::uint32_t first_plane;  ///< There: of the first sample; the others follow.
+    bool clears;                ///< Filled with `clear` before the first draw.
+    std::uint32_t clear[4];
 };
 struct TargetSet {
     ColorTarget colors[8];
     std::uint32_t color_count;
+    std::uint32_t color_planes;  ///< Words of all targets and samples.
+    bool streams_colors;         ///< They are larger than what caches keep for whoever reads them.
     DepthLayout depth_layout;
     std::byte* depth;
     std::uint64_t depth_sample_stride;
@@ -117,6 +124,8 @@ struct TargetSet {
     std::byte* stencil;  ///< Null where there is none.
     std::uint64_t stencil_sample_stride;
     std::uint32_t stencil_row_stride;
+    bool depth_clears, stencil_clears;  ///< As ColorTarget::clears.
+    std::uint32_t clear_depth, clear_stencil;
     std::uint32_t width, height, samples, tiles_x, tiles_y;
 };
 
@@ -163,30 +172,37 @@ struct DrawPlan {
     double scale[3], translation[3];
 };
 
-inline constexpr std::uint32_t stream_quads = 16;
+/// As many quads go to the fragment function at once.
+inline constexpr std::uint32_t stream_quads = 32;
 inline constexpr std::uint32_t stream_batches = stream_quads;  ///< Of one quad each, with four lanes.
+/// A stream is emptied when it holds `stream_quads`, which four blocks that are appended together may pass by; they are
+/// appended without branches, which takes another block.
+inline constexpr std::uint32_t stream_capacity = stream_quads + 16 + 4;
 /// One slot for each quad that waits, the primitive that is drawn, and some so that none is used again too early.
 inline constexpr std::uint32_t primitive_slots = 2 * stream_quads;
+static_assert(primitive_slots > stream_capacity);
 
-/// Quads that wait for the fragment function. A block is appended without branches, hence the four more.
+/// Quads that wait for the fragment function.
 struct Stream {
-    const PrimitiveData* primitives[stream_quads + 4];
-    std::int32_t x[stream_quads + 4], y[stream_quads + 4];
-    std::uint32_t live[stream_quads + 4];    ///< Pixels, 4 bits.
-    std::uint32_t places[stream_quads + 4];  ///< In the tile's depth: first lane.
+    const PrimitiveData* primitives[stream_capacity];
+    /// First lane of the quad in the tile, and above its pixels.
+    std::uint32_t places[stream_capacity];
+    static constexpr std::uint32_t place_mask = 0xffff, live_shift = 16;
     /// With several samples, for each pixel one bit for each: samples that the primitive covers, and those of them that
     /// passed the tests so far.
-    std::uint8_t covered[stream_quads + 4][4], alive[stream_quads + 4][4];
+    std::uint8_t covered[stream_capacity][4], alive[stream_capacity][4];
     std::uint32_t quads;
 };
 
-/// Memory of one thread. Depth and stencil of a tile lie here as 32-bit integers that compare like the depths, in
-/// blocks of 4x4 pixels that consist of four quads: pixel (x, y) of quad (i, j) is lane 4 * (2 * j + i) + 2 * y + x.
+/// Memory of one thread. The pixels of a tile lie here in blocks of 4x4 that consist of four quads: pixel (x, y) of quad
+/// (i, j) is lane 4 * (2 * j + i) + 2 * y + x. Depth and stencil are 32-bit integers that compare like the depths. Colors
+/// are the words of the texels: those of a block together, TargetSet::color_planes times 16 lanes.
 struct alignas(64) Workspace {
     std::int32_t depth[most_samples][tile_pixels];
     std::int32_t stencil[most_samples][tile_pixels];
     Stream streams[most_samples];
     FragmentBatch batches[stream_batches];
+    std::uint32_t* colors;         ///< For the whole tile; aligned to 64 bytes.
     std::byte* primitives;         ///< `primitive_slots` of the largest DrawPlan::primitive_bytes.
     std::uint64_t passed_samples;  ///< Counts up.
 };
@@ -198,6 +214,7 @@ struct TileJob {
     const DrawPlan* const* draws;
     std::uint32_t lanes;
     const SrgbTables* srgb;
+    const std::uint8_t* uncleared;  ///< For each tile: whether targets that are to be cleared still are to be.
 };
 
 /// Vertices of a segment that come from one call of the vertex function.
@@ -215,10 +232,37 @@ struct VertexFinish {
     SetupVertex* setup;
 };
 
+/// Slopes beyond this come from triangles without area; flat is the best that can be said of them.
+inline constexpr double steepest_slope = 1e30;
+/// Twice the area, in pixels: below, the rounding of coordinates decides about the triangle.
+inline constexpr double thin_area = 1.0 / 4096.0;
+
+/// Up to sixteen triangles of a draw with one sample, filled.
+struct TriangleSetup {
+    const SetupVertex* vertices;
+    const std::byte* screen;  ///< What SetupVertex::offset counts from.
+    rhi::CullMode cull;
+    bool front_is_clockwise;
+    std::int32_t x_begin, x_end, y_begin, y_end;  ///< As in DrawPlan.
+    float bias, bias_slope, bias_clamp;
+    double bias_unit;         ///< What `bias` counts; 0: that of the depth itself, which is a float.
+    std::uint32_t draw_bits;  ///< Record::bits of the draw.
+    std::uint32_t first_primitive;
+    std::uint32_t count;
+    std::uint32_t locals[3][16];  ///< Corners, into `vertices`; valid in all sixteen.
+
+    // Results, one bit for each triangle.
+    std::uint32_t drawn;    ///< Its record and tiles are made.
+    std::uint32_t special;  ///< Must be clipped, or rounding decides about it: not done here. All others cover nothing.
+    alignas(64) Record records[16];
+    alignas(64) std::int32_t left[16], right[16], top[16], bottom[16];  ///< Tiles, inclusive.
+};
+
 /// The functions that exist once for each instruction set. All sets give the same bits.
 struct Kernels {
     const char* name;
     void (*finish_vertices)(const VertexFinish& finish);
+    void (*set_up_triangles)(TriangleSetup& work);
     void (*draw_tile)(const TileJob& job, std::uint32_t tile, Workspace& workspace);
 };
 extern const Kernels kernels_baseline;

@@ -2,6 +2,7 @@
 // Compiled once for each instruction set, with NACRE_RASTER_KERNELS as the name of the result. Nothing here may have
 // external linkage but that name, and nothing from the standard library may be called that is not inlined for certain.
 #include "backends/cpu/raster/tile_coverage.h"
+#include "backends/cpu/raster/triangle_lanes.h"
 #include "backends/cpu/raster/vertex_lanes.h"
 
 namespace nacre::cpu::raster {
@@ -10,11 +11,11 @@ namespace {
 void draw_record(TileRun& run, const Record& record, const std::byte* vertices) {
     run.begin_record(record, vertices);
     if (record.bits & Record::thin_line) {
-        ThinLine{{run, {}, {}, {}, 0, 0, 0, 0, 0, false, {}}}.draw();
+        ThinLine{Coverage<false>(run)}.draw();
     } else if (run.targets.samples > 1) {
-        Coverage<true>{run, {}, {}, {}, 0, 0, 0, 0, 0, false, {}}.draw_triangle();
+        Coverage<true>(run).draw_triangle();
     } else {
-        Coverage<false>{run, {}, {}, {}, 0, 0, 0, 0, 0, false, {}}.draw_triangle();
+        Coverage<false>(run).draw_triangle();
     }
 }
 
@@ -65,6 +66,6 @@ void draw_tile(const TileJob& job, std::uint32_t tile, Workspace& workspace) {
 }  // namespace
 
 extern const Kernels NACRE_RASTER_KERNELS;
-const Kernels NACRE_RASTER_KERNELS = {NACRE_RASTER_NAME, finish_vertices, draw_tile};
+const Kernels NACRE_RASTER_KERNELS = {NACRE_RASTER_NAME, finish_vertices, set_up_triangles, draw_tile};
 
 }  // namespace nacre::cpu::raster

@@ -5,90 +5,17 @@
 #include "backends/cpu/raster/tile_data.h"
 
 /// @file
-/// Colors of sixteen lanes into the targets: blending, write masks, packing. Internal linkage, as in simd.h.
+/// Colors of sixteen lanes as texels: blending, write masks, packing. Internal linkage, as in simd.h.
 
 namespace nacre::cpu::raster {
 namespace {
 
-/// Where the four quads of a batch lie in a target.
-struct QuadRows {
-    std::byte* top[4];  ///< Texel 0; texel 2 lies one row below.
-};
-
-NACRE_LANES_INLINE void store_quad(std::byte* top, std::uint32_t row_stride, std::uint32_t texel_bytes,
-                                   std::uint32_t live, const std::uint32_t (*words)[16], std::uint32_t lane) {
-    for (std::uint32_t row = 0; row < 2; ++row) {
-        std::byte* const texel = top + row * static_cast<std::size_t>(row_stride);
-        const std::uint32_t first = lane + 2 * row;
-        const std::uint32_t pair = live >> (2 * row) & 3;
-        switch (texel_bytes) {
-            case 1:
-                for (std::uint32_t i = 0; i < 2; ++i)
-                    if (pair >> i & 1) std::memcpy(texel + i, &words[0][first + i], 1);
-                break;
-            case 2:
-                for (std::uint32_t i = 0; i < 2; ++i)
-                    if (pair >> i & 1) std::memcpy(texel + 2 * i, &words[0][first + i], 2);
-                break;
-            case 4:
-                if (pair == 3) {
-                    std::memcpy(texel, &words[0][first], 8);
-                } else {
-                    for (std::uint32_t i = 0; i < 2; ++i)
-                        if (pair >> i & 1) std::memcpy(texel + 4 * i, &words[0][first + i], 4);
-                }
-                break;
-            default:
-                for (std::uint32_t i = 0; i < 2; ++i)
-                    if (pair >> i & 1)
-                        for (std::uint32_t word = 0; word < texel_bytes / 4; ++word)
-                            std::memcpy(texel + i * texel_bytes + 4 * word, &words[word][first + i], 4);
-                break;
-        }
-    }
-}
-
-inline void load_quad(const std::byte* top, std::uint32_t row_stride, std::uint32_t texel_bytes, std::uint32_t live,
-                      std::uint32_t (*words)[16], std::uint32_t lane) {
-    for (std::uint32_t i = 0; i < 4; ++i) {
-        if ((live >> i & 1) == 0) continue;
-        const std::byte* const texel = top + (i >> 1) * static_cast<std::size_t>(row_stride) + (i & 1) * texel_bytes;
-        if (texel_bytes < 4) {
-            std::uint32_t value = 0;
-            std::memcpy(&value, texel, texel_bytes);
-            words[0][lane + i] = value;
-        } else {
-            for (std::uint32_t word = 0; word < texel_bytes / 4; ++word)
-                std::memcpy(&words[word][lane + i], texel + 4 * word, 4);
-        }
-    }
-}
-
-/// Texels of 32 bits of a batch whose quads lie inside of the target. Pixels that do not count are written back as they
-/// were: no other thread touches the tile, and a branch for each of them would cost more.
-/// @param keep  all bits in lanes that do not count
-inline void store_words(const QuadRows& rows, std::uint32_t row_stride, std::uint32_t quads, const std::uint32_t* words,
-                        const std::uint32_t* keep) {
-    for (std::uint32_t quad = 0; quad < quads; ++quad)
-        for (std::uint32_t row = 0; row < 2; ++row) {
-            std::byte* const texels = rows.top[quad] + row * static_cast<std::size_t>(row_stride);
-            std::uint64_t old, fresh, kept;
-            std::memcpy(&old, texels, 8);
-            std::memcpy(&fresh, words + 4 * quad + 2 * row, 8);
-            std::memcpy(&kept, keep + 4 * quad + 2 * row, 8);
-            fresh ^= (fresh ^ old) & kept;
-            std::memcpy(texels, &fresh, 8);
-        }
-}
-/// The same for a whole block of 4x4 pixels.
-inline void store_block_words(std::byte* texels, std::uint32_t row_stride, const std::uint32_t* words) {
-    for (std::uint32_t row = 0; row < 4; ++row) {
-        const std::uint32_t* const from = words + 8 * (row / 2) + 2 * (row & 1);
-        std::uint64_t left, right;
-        std::memcpy(&left, from, 8), std::memcpy(&right, from + 4, 8);
-        std::memcpy(texels, &left, 8), std::memcpy(texels + 8, &right, 8);
-        texels += row_stride;
-    }
+/// Writes pixels of a quad; those that do not count are written back as they were: no other thread touches the tile, and
+/// a branch for each of them would cost more.
+/// @param keep  all bits in pixels that do not count
+NACRE_LANES_INLINE void store_quad(std::uint32_t* to, const std::uint32_t* from, Int4 keep) {
+    const Int4 old = load4(to), fresh = load4(from);
+    store4(to, fresh ^ ((fresh ^ old) & keep));
 }
 
 /// What blend factors are made of.
@@ -159,20 +86,13 @@ inline void pack_colors(const ColorPlan& plan, const ColorTarget& target, const 
     Ints channels[4], packed[4];
     load_channels(batch, plan.output, plan.components, channels);
     encode_texels(target.format, srgb, channels, packed);
-    const std::uint32_t count = target.texel_bytes < 4 ? 1 : target.texel_bytes / 4;
-    for (std::uint32_t i = 0; i < count; ++i) store(words[i], packed[i]);
+    for (std::uint32_t i = 0; i < target.words; ++i) store(words[i], packed[i]);
 }
 
-/// Colors of `plan` for the lanes in `live`, over what the target holds: read, blended, masked. No two lanes are the
-/// same pixel.
+/// Colors of `plan` over `old`, what the target holds: blended, masked.
 inline void blend_colors(const DrawPlan& draw, const ColorPlan& plan, const ColorTarget& target, const SrgbTables& srgb,
-                         const FragmentBatch& batch, const QuadRows& rows, std::uint32_t live,
+                         const FragmentBatch& batch, const std::uint32_t (&old)[4][16],
                          std::uint32_t (&words)[4][16]) {
-    const std::uint32_t count = target.texel_bytes < 4 ? 1 : target.texel_bytes / 4;
-    alignas(64) std::uint32_t old[4][16] = {};
-    for (std::uint32_t quad = 0; quad < 4; ++quad)
-        if (const std::uint32_t lanes = live >> (4 * quad) & 15)
-            load_quad(rows.top[quad], target.row_stride, target.texel_bytes, lanes, old, 4 * quad);
     Ints old_words[4], channels[4], packed[4];
     for (std::uint32_t i = 0; i < 4; ++i) old_words[i] = load(old[i]);
     load_channels(batch, plan.output, plan.components, channels);
@@ -195,7 +115,7 @@ inline void blend_colors(const DrawPlan& draw, const ColorPlan& plan, const Colo
             bits_of(blend_channel(blend.alpha_operation, blend.source_alpha, blend.destination_alpha, inputs, 3));
     }
     encode_texels(target.format, srgb, channels, packed);
-    for (std::uint32_t i = 0; i < count; ++i) {
+    for (std::uint32_t i = 0; i < target.words; ++i) {
         const Ints written = ints(static_cast<std::int32_t>(plan.word_masks[i]));
         store(words[i], (packed[i] & written) | (old_words[i] & ~written));
     }

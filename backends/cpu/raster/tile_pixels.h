@@ -5,7 +5,8 @@
 #include "backends/cpu/raster/tile_data.h"
 
 /// @file
-/// Depth and stencil of a tile: brought in from the targets, tested, written back. Internal linkage, as in simd.h.
+/// Pixels of a tile, brought in from the targets and written back; the tests of depth and stencil. Internal linkage, as
+/// in simd.h.
 
 namespace nacre::cpu::raster {
 namespace {
@@ -18,71 +19,192 @@ NACRE_LANES_INLINE std::uint32_t block_place(std::int32_t x, std::int32_t y) {
     return static_cast<std::uint32_t>(y * tile_blocks + x) * 16;
 }
 
-/// Rows of `width` x `height` pixels of `Element` to blocks of integers, and back.
-template <typename Element>
-inline void load_pixels(const std::byte* from, std::uint32_t row_stride, std::int32_t width, std::int32_t height,
-                        std::int32_t* to) {
-    for (std::int32_t y = 0; y < height; y += 4)
-        for (std::int32_t x = 0; x < width; x += 4) {
-            std::int32_t* const block = to + block_place(x / 4, y / 4);
-            if (x + 4 <= width && y + 4 <= height) {
-                for (std::int32_t row = 0; row < 4; ++row) {
-                    Element texels[4];
-                    std::memcpy(texels, from + static_cast<std::size_t>(y + row) * row_stride + x * sizeof(Element),
-                                sizeof(texels));
-                    std::int32_t* const line = block + 8 * (row / 2) + 2 * (row & 1);
-                    line[0] = static_cast<std::int32_t>(texels[0]), line[1] = static_cast<std::int32_t>(texels[1]);
-                    line[4] = static_cast<std::int32_t>(texels[2]), line[5] = static_cast<std::int32_t>(texels[3]);
-                }
-                continue;
-            }
-            for (int lane = 0; lane < 16; ++lane) {
-                block[lane] = 0;
-                if (x + lane_x[lane] >= width || y + lane_y[lane] >= height) continue;
-                Element texel;
-                std::memcpy(&texel,
-                            from + static_cast<std::size_t>(y + lane_y[lane]) * row_stride +
-                                static_cast<std::size_t>(x + lane_x[lane]) * sizeof(Element),
-                            sizeof(texel));
-                block[lane] = static_cast<std::int32_t>(texel);
-            }
-        }
+/// Four texels of a row, `bytes` each, as one vector for each 32-bit word of a texel (one for texels below 32 bits), and
+/// back.
+template <int bytes>
+NACRE_LANES_INLINE void load_row(const std::byte* from, Int4* words) {
+    if constexpr (bytes == 1) {
+        using Bytes [[gnu::vector_size(4)]] = std::uint8_t;
+        Bytes texels;
+        std::memcpy(&texels, from, sizeof(texels));
+        words[0] = __builtin_convertvector(texels, Int4);
+    } else if constexpr (bytes == 2) {
+        using Halves [[gnu::vector_size(8)]] = std::uint16_t;
+        Halves texels;
+        std::memcpy(&texels, from, sizeof(texels));
+        words[0] = __builtin_convertvector(texels, Int4);
+    } else if constexpr (bytes == 4) {
+        words[0] = load4(from);
+    } else if constexpr (bytes == 8) {
+        const Int4 low = load4(from), high = load4(from + 16);
+        words[0] = __builtin_shufflevector(low, high, 0, 2, 4, 6);
+        words[1] = __builtin_shufflevector(low, high, 1, 3, 5, 7);
+    } else {
+        for (int i = 0; i < 4; ++i) words[i] = load4(from + 16 * i);
+        transpose(words[0], words[1], words[2], words[3]);
+    }
+}
+/// @param streams  past the caches; rows must be aligned to 16 bytes. For texels of at least 4 bytes.
+template <int bytes, bool streams>
+NACRE_LANES_INLINE void store_row(std::byte* to, const Int4* words) {
+    const auto put = [](std::byte* at, Int4 value) {
+        if constexpr (streams)
+            stream4(at, value);
+        else
+            store4(at, value);
+    };
+    if constexpr (bytes == 1) {
+        using Bytes [[gnu::vector_size(4)]] = std::uint8_t;
+        const Bytes texels = __builtin_convertvector(words[0], Bytes);
+        std::memcpy(to, &texels, sizeof(texels));
+    } else if constexpr (bytes == 2) {
+        using Halves [[gnu::vector_size(8)]] = std::uint16_t;
+        const Halves texels = __builtin_convertvector(words[0], Halves);
+        std::memcpy(to, &texels, sizeof(texels));
+    } else if constexpr (bytes == 4) {
+        put(to, words[0]);
+    } else if constexpr (bytes == 8) {
+        put(to, __builtin_shufflevector(words[0], words[1], 0, 4, 1, 5));
+        put(to + 16, __builtin_shufflevector(words[0], words[1], 2, 6, 3, 7));
+    } else {
+        Int4 texels[4] = {words[0], words[1], words[2], words[3]};
+        transpose(texels[0], texels[1], texels[2], texels[3]);
+        for (int i = 0; i < 4; ++i) put(to + 16 * i, texels[i]);
+    }
 }
 
-template <typename Element>
-inline void store_pixels(std::byte* to, std::uint32_t row_stride, std::int32_t width, std::int32_t height,
-                         const std::int32_t* from) {
-    for (std::int32_t y = 0; y < height; y += 4)
-        for (std::int32_t x = 0; x < width; x += 4) {
-            const std::int32_t* const block = from + block_place(x / 4, y / 4);
-            if (x + 4 <= width && y + 4 <= height) {
-                for (std::int32_t row = 0; row < 4; ++row) {
-                    const std::int32_t* const line = block + 8 * (row / 2) + 2 * (row & 1);
-                    const Element texels[4] = {static_cast<Element>(line[0]), static_cast<Element>(line[1]),
-                                               static_cast<Element>(line[4]), static_cast<Element>(line[5])};
-                    std::memcpy(to + static_cast<std::size_t>(y + row) * row_stride + x * sizeof(Element), texels,
-                                sizeof(texels));
-                }
+/// Pixels of a target in the memory of a tile: blocks of 16 lanes, one array for each word of a texel.
+struct TileArea {
+    std::int32_t* blocks;       ///< First word of the first block.
+    std::uint32_t block_words;  ///< From a block to the next in its row, and from its row to the next of the tile.
+    std::uint32_t row_words;
+    std::int32_t width, height;  ///< Pixels; what of a block sticks out of them is not in the target.
+};
+
+/// Rows of texels of `bytes` bytes to blocks, and back.
+template <int bytes>
+inline void load_pixels(const std::byte* from, std::uint32_t row_stride, const TileArea& area) {
+    constexpr int words = bytes < 4 ? 1 : bytes / 4;
+    for (std::int32_t y = 0; y < area.height; y += 4) {
+        const std::byte* const line = from + static_cast<std::size_t>(y) * row_stride;
+        std::int32_t* block = area.blocks + static_cast<std::size_t>(y / 4) * area.row_words;
+        for (std::int32_t x = 0; x < area.width; x += 4, block += area.block_words) {
+            if (x + 4 <= area.width && y + 4 <= area.height) {
+                Int4 rows[4][words];
+                for (int row = 0; row < 4; ++row)
+                    load_row<bytes>(line + static_cast<std::size_t>(row) * row_stride + x * bytes, rows[row]);
+                for (int word = 0; word < words; ++word)
+                    for (int pair = 0; pair < 2; ++pair) {
+                        const Int4 top = rows[2 * pair][word], bottom = rows[2 * pair + 1][word];
+                        store4(block + 16 * word + 8 * pair, __builtin_shufflevector(top, bottom, 0, 1, 4, 5));
+                        store4(block + 16 * word + 8 * pair + 4, __builtin_shufflevector(top, bottom, 2, 3, 6, 7));
+                    }
                 continue;
             }
             for (int lane = 0; lane < 16; ++lane) {
-                if (x + lane_x[lane] >= width || y + lane_y[lane] >= height) continue;
-                const Element texel = static_cast<Element>(block[lane]);
-                std::memcpy(to + static_cast<std::size_t>(y + lane_y[lane]) * row_stride +
-                                static_cast<std::size_t>(x + lane_x[lane]) * sizeof(Element),
-                            &texel, sizeof(texel));
+                const bool inside = x + lane_x[lane] < area.width && y + lane_y[lane] < area.height;
+                std::uint32_t texel[words] = {};
+                if (inside)
+                    std::memcpy(texel,
+                                line + static_cast<std::size_t>(lane_y[lane]) * row_stride +
+                                    static_cast<std::size_t>(x + lane_x[lane]) * bytes,
+                                bytes);
+                for (int word = 0; word < words; ++word) std::memcpy(block + 16 * word + lane, texel + word, 4);
             }
         }
+    }
+}
+
+template <int bytes, bool streams>
+inline void store_pixels(std::byte* to, std::uint32_t row_stride, const TileArea& area) {
+    constexpr int words = bytes < 4 ? 1 : bytes / 4;
+    for (std::int32_t y = 0; y < area.height; y += 4) {
+        std::byte* const line = to + static_cast<std::size_t>(y) * row_stride;
+        const std::int32_t* const blocks = area.blocks + static_cast<std::size_t>(y / 4) * area.row_words;
+        const std::int32_t whole = area.height - y < 4 ? 0 : area.width / 4;
+        // Row by row, so that lines of the cache are written as a whole.
+        for (int row = 0; row < 4; ++row) {
+            std::byte* texels = line + static_cast<std::size_t>(row) * row_stride;
+            const std::int32_t* block = blocks + 8 * (row / 2) + 2 * (row & 1);
+            for (std::int32_t x = 0; x < whole; ++x, texels += 4 * bytes, block += area.block_words) {
+                Int4 all[words];
+                for (int word = 0; word < words; ++word) {
+                    std::int64_t halves[2];
+                    std::memcpy(halves, block + 16 * word, 8), std::memcpy(halves + 1, block + 16 * word + 4, 8);
+                    std::memcpy(all + word, halves, 16);
+                }
+                store_row<bytes, streams>(texels, all);
+            }
+        }
+        for (std::int32_t x = 4 * whole; x < area.width; x += 4)
+            for (int lane = 0; lane < 16; ++lane) {
+                if (x + lane_x[lane] >= area.width || y + lane_y[lane] >= area.height) continue;
+                std::uint32_t texel[words];
+                for (int word = 0; word < words; ++word)
+                    std::memcpy(texel + word,
+                                blocks + static_cast<std::size_t>(x / 4) * area.block_words + 16 * word + lane, 4);
+                std::memcpy(line + static_cast<std::size_t>(lane_y[lane]) * row_stride +
+                                static_cast<std::size_t>(x + lane_x[lane]) * bytes,
+                            texel, bytes);
+            }
+    }
+}
+
+/// All pixels of the area, also those that are not in the target.
+inline void fill_pixels(const std::uint32_t* texel, std::uint32_t words, const TileArea& area) {
+    for (std::int32_t y = 0; y < area.height; y += 4) {
+        std::int32_t* block = area.blocks + static_cast<std::size_t>(y / 4) * area.row_words;
+        for (std::int32_t x = 0; x < area.width; x += 4, block += area.block_words)
+            for (std::uint32_t word = 0; word < words; ++word)
+                store(block + 16 * word, ints(static_cast<std::int32_t>(texel[word])));
+    }
+}
+/// The same in a target.
+inline void fill_texels(const std::uint32_t* texel, std::uint32_t bytes, std::byte* to, std::uint32_t row_stride,
+                        std::int32_t width, std::int32_t height) {
+    alignas(64) std::byte pattern[64];
+    for (std::uint32_t at = 0; at < sizeof(pattern); at += bytes) __builtin_memcpy(pattern + at, texel, bytes);
+    const std::size_t length = static_cast<std::size_t>(width) * bytes;
+    for (std::int32_t y = 0; y < height; ++y, to += row_stride) {
+        std::size_t at = 0;
+        for (; at + sizeof(pattern) <= length; at += sizeof(pattern)) std::memcpy(to + at, pattern, sizeof(pattern));
+        for (; at < length; at += bytes) __builtin_memcpy(to + at, texel, bytes);
+    }
+}
+
+inline void load_pixels(std::uint32_t bytes, const std::byte* from, std::uint32_t row_stride, const TileArea& area) {
+    switch (bytes) {
+        case 1: load_pixels<1>(from, row_stride, area); break;
+        case 2: load_pixels<2>(from, row_stride, area); break;
+        case 4: load_pixels<4>(from, row_stride, area); break;
+        case 8: load_pixels<8>(from, row_stride, area); break;
+        default: load_pixels<16>(from, row_stride, area); break;
+    }
+}
+/// @param streams  past the caches, where rows are aligned for that
+inline void store_pixels(std::uint32_t bytes, std::byte* to, std::uint32_t row_stride, const TileArea& area,
+                         bool streams) {
+    const bool aligned = ((reinterpret_cast<std::uintptr_t>(to) | row_stride) & 15) == 0;
+    switch (streams && aligned && bytes >= 4 ? bytes + 1 : bytes) {
+        case 1: store_pixels<1, false>(to, row_stride, area); break;
+        case 2: store_pixels<2, false>(to, row_stride, area); break;
+        case 4: store_pixels<4, false>(to, row_stride, area); break;
+        case 5: store_pixels<4, true>(to, row_stride, area); break;
+        case 8: store_pixels<8, false>(to, row_stride, area); break;
+        case 9: store_pixels<8, true>(to, row_stride, area); break;
+        case 16: store_pixels<16, false>(to, row_stride, area); break;
+        default: store_pixels<16, true>(to, row_stride, area); break;
+    }
 }
 
 /// Depth as the integer that the target holds; integers compare like the depths. Floats that are not negative compare
-/// like their bits. `low` and `high` are the range of depth clamp, or 0 and 1.
+/// like their bits. `low` and `high` are the range of depth clamp, or 0 and 1; `low` is not negative, nor negative zero.
 NACRE_LANES_INLINE Ints depth_key(DepthLayout layout, const Floats& depth, float low, float high) {
     const Floats bounded = clamp(depth, low, high);
     switch (layout) {
         case DepthLayout::unorm16: return round_to_ints(bounded * floats(65535.0f));
         case DepthLayout::unorm24: return round_to_ints(bounded * floats(16777215.0f));
-        default: return bits_of(bounded) & ints(0x7fffffff);
+        default: return bits_of(bounded);
     }
 }
 /// The same for one number, in the same arithmetic.
@@ -92,7 +214,7 @@ NACRE_LANES_INLINE std::int32_t depth_key(DepthLayout layout, float depth, float
     switch (layout) {
         case DepthLayout::unorm16: return static_cast<std::int32_t>(__builtin_rintf(bounded * 65535.0f));
         case DepthLayout::unorm24: return static_cast<std::int32_t>(__builtin_rintf(bounded * 16777215.0f));
-        default: return __builtin_bit_cast(std::int32_t, bounded) & 0x7fffffff;
+        default: return __builtin_bit_cast(std::int32_t, bounded);
     }
 }
 

@@ -21,8 +21,17 @@ inline bool keeps_farther(rhi::CompareOperation operation) {
 }
 
 inline constexpr std::int32_t region_blocks = 4;  ///< A region of hierarchical depth has 4x4 blocks.
+inline constexpr std::int32_t region_size = 4 * region_blocks;
 inline constexpr std::int32_t regions_across = tile_blocks / region_blocks;
 inline constexpr std::int32_t key_lowest = -0x7fffffff - 1, key_highest = 0x7fffffff;
+
+/// The numbers of the quads in a set of four, and behind them whatever.
+alignas(16) constexpr std::int32_t quad_order[16][4] = {
+    {0, 0, 0, 0}, {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {2, 0, 0, 0}, {0, 2, 0, 0}, {1, 2, 0, 0}, {0, 1, 2, 0},
+    {3, 0, 0, 0}, {0, 3, 0, 0}, {1, 3, 0, 0}, {0, 1, 3, 0}, {2, 3, 0, 0}, {0, 2, 3, 0}, {1, 2, 3, 0}, {0, 1, 2, 3}};
+
+/// Where the blocks right of, below, and right below of another lie.
+constexpr std::uint32_t four_blocks[4] = {0, 16, 16 * tile_blocks, 16 * tile_blocks + 16};
 
 struct TileRun {
     const TileJob& job;
@@ -32,27 +41,35 @@ struct TileRun {
 
     const DrawPlan* draw = nullptr;
     std::uint32_t draw_index = ~0u;
+    const bool clears;  ///< Targets that are to be cleared are to be cleared here.
     bool depth_loaded = false, depth_changed = false, stencil_loaded = false, stencil_changed = false;
     std::int32_t* depth = nullptr;  ///< Where the draw tests depth.
     std::int32_t* stencil = nullptr;
     float depth_low = 0.0f, depth_high = 1.0f;
     bool simple_depth = false;                        ///< See Coverage::run_simple_blocks.
-    bool lowers_depth = false, raises_depth = false;  ///< What the draw writes may leave the bounds of a region there.
+    alignas(16) std::int32_t limits[4] = {};  ///< Pixels that may be drawn: first x and y, last x and y with all bits turned.
 
     // The record that is drawn.
     const Record* record = nullptr;
     const std::byte* vertex_memory = nullptr;
     const PrimitiveData* primitive = nullptr;
     std::uint32_t next_slot = 0;
-    std::uint32_t entered_regions = 0, fetched_regions = 0;  ///< One bit for each region: see enter_region.
+    // One bit for each region: colors that are in the tile's memory, those of all targets that the draw writes, and of each.
+    std::uint32_t entered_regions = 0, loaded_regions[8] = {};
     bool front = true;
 
-    // Hierarchical depth: bounds of the depths of each region, and how many blocks were written since they were exact.
-    std::int32_t region_low[regions_across * regions_across], region_high[regions_across * regions_across];
-    std::uint32_t region_writes[regions_across * regions_across];
+    // Hierarchical depth: for each region a depth that no other is above, or below. Draws that keep the nearer (farther)
+    // depth can leave it as it is; it becomes exact again when the region is measured.
+    enum class Bound { none, above, below };
+    Bound bound = Bound::none;
+    bool depth_is_clear = false;  ///< All depths are TargetSet::clear_depth.
+    std::int32_t region_bounds[regions_across * regions_across];
+    std::uint8_t region_doubts[regions_across * regions_across];  ///< Questions since a region was measured.
+    /// Blocks that were written since their region was measured: a row of the tile each. One more than there are.
+    std::uint16_t written_blocks[tile_blocks + 1];
 
     TileRun(const TileJob& of_job, std::uint32_t tile, Workspace& workspace)
-        : job(of_job), targets(*of_job.targets), memory(workspace) {
+        : job(of_job), targets(*of_job.targets), memory(workspace), clears(of_job.uncleared[tile] != 0) {
         tile_x = static_cast<std::int32_t>(tile % targets.tiles_x) * tile_size;
         tile_y = static_cast<std::int32_t>(tile / targets.tiles_x) * tile_size;
         const std::int32_t rest_x = static_cast<std::int32_t>(targets.width) - tile_x;
@@ -60,52 +77,129 @@ struct TileRun {
         width = rest_x < tile_size ? rest_x : tile_size;
         height = rest_y < tile_size ? rest_y : tile_size;
         for (std::uint32_t sample = 0; sample < most_samples; ++sample) memory.streams[sample].quads = 0;
+        if (targets.samples > 1) return;
+        // The same for all batches.
+        for (std::uint32_t i = 0; i < stream_quads / (job.lanes / 4); ++i) set_samples(memory.batches[i], 0, false);
     }
 
     // ---- Targets -------------------------------------------------------------------------------------------------
 
+    [[nodiscard]] TileArea plane_area(std::int32_t (*plane)[tile_pixels], std::uint32_t sample) const {
+        return {plane[sample], 16, 16 * tile_blocks, width, height};
+    }
+    /// Of a target's sample, all or a part of the tile.
+    [[nodiscard]] TileArea color_area(const ColorTarget& target, std::uint32_t sample, std::int32_t x, std::int32_t y,
+                                      std::int32_t across, std::int32_t down) const {
+        const std::uint32_t block_words = targets.color_planes * 16;
+        auto* const blocks = reinterpret_cast<std::int32_t*>(colors_at(block_place(x / 4, y / 4))) +
+                             static_cast<std::size_t>(target.first_plane + sample * target.words) * 16;
+        return {blocks, block_words, block_words * tile_blocks, width - x < across ? width - x : across,
+                height - y < down ? height - y : down};
+    }
+    [[nodiscard]] std::byte* texels_of(const ColorTarget& target, std::uint32_t sample, std::int32_t x,
+                                       std::int32_t y) const {
+        return target.data + sample * target.sample_stride +
+               static_cast<std::size_t>(tile_y + y) * target.row_stride +
+               static_cast<std::size_t>(tile_x + x) * target.texel_bytes;
+    }
+    /// Where the words of a pixel begin; those of target's sample lie `color_offset` behind, 16 from one to the next.
+    [[nodiscard]] std::uint32_t* colors_at(std::uint32_t place) const {
+        return memory.colors + static_cast<std::size_t>(place >> 4) * (targets.color_planes * 16) + (place & 15);
+    }
+    static std::uint32_t color_offset(const ColorTarget& target, std::uint32_t sample) {
+        return (target.first_plane + sample * target.words) * 16;
+    }
+    [[nodiscard]] std::uint32_t depth_bytes() const { return targets.depth_layout == DepthLayout::unorm16 ? 2 : 4; }
+    [[nodiscard]] std::byte* depth_texels(std::uint32_t sample) const {
+        return targets.depth + sample * targets.depth_sample_stride +
+               static_cast<std::size_t>(tile_y) * targets.depth_row_stride +
+               static_cast<std::size_t>(tile_x) * depth_bytes();
+    }
+    [[nodiscard]] std::byte* stencil_texels(std::uint32_t sample) const {
+        return targets.stencil + sample * targets.stencil_sample_stride +
+               static_cast<std::size_t>(tile_y) * targets.stencil_row_stride + tile_x;
+    }
+
     void bring_in_depth() {
-        for (std::uint32_t sample = 0; sample < targets.samples; ++sample) {
-            const std::byte* const from = targets.depth + sample * targets.depth_sample_stride +
-                                          static_cast<std::size_t>(tile_y) * targets.depth_row_stride;
-            if (targets.depth_layout == DepthLayout::unorm16)
-                load_pixels<std::uint16_t>(from + static_cast<std::size_t>(tile_x) * 2, targets.depth_row_stride, width,
-                                           height, memory.depth[sample]);
-            else
-                load_pixels<std::uint32_t>(from + static_cast<std::size_t>(tile_x) * 4, targets.depth_row_stride, width,
-                                           height, memory.depth[sample]);
-        }
         depth_loaded = true;
-        for (int region = 0; region < regions_across * regions_across; ++region) {
-            region_low[region] = key_lowest, region_high[region] = key_highest;
-            region_writes[region] = 255;
-        }
+        depth_is_clear = clears && targets.depth_clears;
+        for (std::uint32_t sample = 0; sample < targets.samples; ++sample)
+            if (depth_is_clear)
+                fill_pixels(&targets.clear_depth, 1, plane_area(memory.depth, sample));
+            else
+                load_pixels(depth_bytes(), depth_texels(sample), targets.depth_row_stride,
+                            plane_area(memory.depth, sample));
     }
     void bring_in_stencil() {
         for (std::uint32_t sample = 0; sample < targets.samples; ++sample)
-            load_pixels<std::uint8_t>(targets.stencil + sample * targets.stencil_sample_stride +
-                                          static_cast<std::size_t>(tile_y) * targets.stencil_row_stride + tile_x,
-                                      targets.stencil_row_stride, width, height, memory.stencil[sample]);
+            if (clears && targets.stencil_clears)
+                fill_pixels(&targets.clear_stencil, 1, plane_area(memory.stencil, sample));
+            else
+                load_pixels(1, stencil_texels(sample), targets.stencil_row_stride, plane_area(memory.stencil, sample));
         stencil_loaded = true;
+    }
+
+    /// The colors of a region, for all targets that the draw writes; it draws there for the first time.
+    [[gnu::noinline]] void enter_region(std::uint32_t region) {
+        entered_regions |= 1u << region;
+        const std::int32_t x = static_cast<std::int32_t>(region % regions_across) * region_size;
+        const std::int32_t y = static_cast<std::int32_t>(region / regions_across) * region_size;
+        for (std::uint32_t i = 0; i < draw->color_count; ++i) {
+            const std::uint32_t index = draw->colors[i].target;
+            if (loaded_regions[index] >> region & 1) continue;
+            loaded_regions[index] |= 1u << region;
+            const ColorTarget& target = targets.colors[index];
+            for (std::uint32_t sample = 0; sample < targets.samples; ++sample) {
+                const TileArea area = color_area(target, sample, x, y, region_size, region_size);
+                if (clears && target.clears)
+                    fill_pixels(target.clear, target.words, area);
+                else
+                    load_pixels(target.texel_bytes, texels_of(target, sample, x, y), target.row_stride, area);
+            }
+        }
+    }
+
+    /// Writes regions of a target back, or fills them where nothing was drawn and they are to be cleared.
+    void store_colors(const ColorTarget& target, std::uint32_t loaded) {
+        constexpr std::uint32_t whole_row = (1u << regions_across) - 1;
+        for (std::int32_t y = 0; y < height; y += region_size, loaded >>= regions_across)
+            for (std::int32_t x = 0; x < width; x += region_size) {
+                const bool is_loaded = (loaded >> (x / region_size) & 1) != 0;
+                if (!is_loaded && !(clears && target.clears)) continue;
+                // A row of the tile at once, where it can be.
+                const bool is_whole = (loaded & whole_row) == (is_loaded ? whole_row : 0);
+                for (std::uint32_t sample = 0; sample < targets.samples; ++sample) {
+                    std::byte* const to = texels_of(target, sample, x, y);
+                    const TileArea area =
+                        color_area(target, sample, x, y, is_whole ? tile_size : region_size, region_size);
+                    if (is_loaded)
+                        store_pixels(target.texel_bytes, to, target.row_stride, area, targets.streams_colors);
+                    else
+                        fill_texels(target.clear, target.texel_bytes, to, target.row_stride, area.width, area.height);
+                }
+                if (is_whole) break;
+            }
     }
 
     void finish() {
         flush();
+        for (std::uint32_t i = 0; i < targets.color_count; ++i)
+            if (targets.colors[i].data) store_colors(targets.colors[i], loaded_regions[i]);
+        if (targets.streams_colors) end_streams();
+        const bool depth_clears = clears && targets.depth_clears, stencil_clears = clears && targets.stencil_clears;
         for (std::uint32_t sample = 0; sample < targets.samples; ++sample) {
-            if (depth_changed) {
-                std::byte* const to = targets.depth + sample * targets.depth_sample_stride +
-                                      static_cast<std::size_t>(tile_y) * targets.depth_row_stride;
-                if (targets.depth_layout == DepthLayout::unorm16)
-                    store_pixels<std::uint16_t>(to + static_cast<std::size_t>(tile_x) * 2, targets.depth_row_stride,
-                                                width, height, memory.depth[sample]);
-                else
-                    store_pixels<std::uint32_t>(to + static_cast<std::size_t>(tile_x) * 4, targets.depth_row_stride,
-                                                width, height, memory.depth[sample]);
-            }
-            if (stencil_changed)
-                store_pixels<std::uint8_t>(targets.stencil + sample * targets.stencil_sample_stride +
-                                               static_cast<std::size_t>(tile_y) * targets.stencil_row_stride + tile_x,
-                                           targets.stencil_row_stride, width, height, memory.stencil[sample]);
+            if (depth_changed || (depth_clears && depth_loaded))
+                store_pixels(depth_bytes(), depth_texels(sample), targets.depth_row_stride,
+                             plane_area(memory.depth, sample), false);
+            else if (depth_clears)
+                fill_texels(&targets.clear_depth, depth_bytes(), depth_texels(sample), targets.depth_row_stride, width,
+                            height);
+            if (stencil_changed || (stencil_clears && stencil_loaded))
+                store_pixels(1, stencil_texels(sample), targets.stencil_row_stride,
+                             plane_area(memory.stencil, sample), false);
+            else if (stencil_clears)
+                fill_texels(&targets.clear_stencil, 1, stencil_texels(sample), targets.stencil_row_stride, width,
+                            height);
         }
     }
 
@@ -125,9 +219,15 @@ struct TileRun {
             stencil = memory.stencil[0];
             stencil_changed = true;
         }
-        lowers_depth = !keeps_farther(plan.compare), raises_depth = !keeps_nearer(plan.compare);
+        entered_regions = ~0u;
+        for (std::uint32_t i = 0; i < draw->color_count; ++i) entered_regions &= loaded_regions[draw->colors[i].target];
+        if (depth) note_bounds(plan);
+        const auto larger = [](std::int32_t a, std::int32_t b) { return a > b ? a : b; };
+        limits[0] = larger(draw->x_begin - tile_x, 0), limits[1] = larger(draw->y_begin - tile_y, 0);
+        limits[2] = larger(~(draw->x_end - tile_x - 1), ~(width - 1));
+        limits[3] = larger(~(draw->y_end - tile_y - 1), ~(height - 1));
         simple_depth = targets.samples == 1 && !draw->late_tests && !stencil;
-        depth_low = plan.clamps ? plan.clamp_low : 0.0f;
+        depth_low = plan.clamps && plan.clamp_low > 0.0f ? plan.clamp_low : 0.0f;
         depth_high = plan.clamps ? plan.clamp_high : 1.0f;
     }
 
@@ -148,10 +248,26 @@ struct TileRun {
 
     /// @param place  of a block, or of a quad in it
     void depth_written(std::uint32_t place) {
-        const std::uint32_t region = (place >> 10) * regions_across + (place >> 6 & 3);
-        ++region_writes[region];
-        if (lowers_depth) region_low[region] = key_lowest;
-        if (raises_depth) region_high[region] = key_highest;
+        written_blocks[place >> 8] = static_cast<std::uint16_t>(written_blocks[place >> 8] | 1u << (place >> 4 & 15));
+    }
+
+    /// What the depths that a draw begins to write mean for the bounds.
+    void note_bounds(const DepthStencilPlan& plan) {
+        const Bound kept = keeps_nearer(plan.compare)    ? Bound::above
+                           : keeps_farther(plan.compare) ? Bound::below
+                                                         : Bound::none;
+        const bool changes_nothing = !plan.depth_write || plan.compare == rhi::CompareOperation::equal ||
+                                     plan.compare == rhi::CompareOperation::never;
+        if (kept != bound && (!changes_nothing || draw->hierarchical)) {
+            bound = kept;
+            for (std::int32_t& at : region_bounds)
+                at = depth_is_clear          ? static_cast<std::int32_t>(targets.clear_depth)
+                     : bound == Bound::above ? key_highest
+                                             : key_lowest;
+            for (std::uint16_t& row : written_blocks) row = depth_is_clear ? 0 : 0xffff;
+            for (std::uint8_t& doubts : region_doubts) doubts = 0;
+        }
+        if (!changes_nothing) depth_is_clear = false;
     }
 
     void measure_region(std::int32_t region_x, std::int32_t region_y) {
@@ -164,15 +280,15 @@ struct TileRun {
                                            block_place(region_x * region_blocks + x, region_y * region_blocks + y));
                     low = minimum(low, keys), high = maximum(high, keys);
                 }
-        std::int32_t lows[16], highs[16];
-        store(lows, low), store(highs, high);
-        std::int32_t least = lows[0], most = highs[0];
-        for (int lane = 1; lane < 16; ++lane) {
-            least = lows[lane] < least ? lows[lane] : least;
-            most = highs[lane] > most ? highs[lane] : most;
-        }
+        std::int32_t keys[16];
+        store(keys, bound == Bound::above ? high : low);
+        std::int32_t extreme = keys[0];
+        for (const std::int32_t key : keys)
+            extreme = bound == Bound::above ? (key > extreme ? key : extreme) : (key < extreme ? key : extreme);
         const std::int32_t region = region_y * regions_across + region_x;
-        region_low[region] = least, region_high[region] = most, region_writes[region] = 0;
+        region_bounds[region] = extreme, region_doubts[region] = 0;
+        for (std::int32_t y = 0; y < region_blocks; ++y)
+            written_blocks[region_y * region_blocks + y] &= static_cast<std::uint16_t>(~(15u << (4 * region_x)));
     }
 
     /// Whether no sample of the record in pixels [x0, x1] x [y0, y1] of the tile, all in one region, passes the depth
@@ -181,7 +297,11 @@ struct TileRun {
     bool hidden(std::int32_t region_x, std::int32_t region_y, std::int32_t x0, std::int32_t x1, std::int32_t y0,
                 std::int32_t y1) {
         const std::int32_t region = region_y * regions_across + region_x;
-        if (region_writes[region] > 16) measure_region(region_x, region_y);
+        std::uint64_t rows;
+        std::memcpy(&rows, written_blocks + region_y * region_blocks, sizeof(rows));
+        const int blocks = __builtin_popcountll(rows & 0x000f000f000f000full << (4 * region_x));
+        // Measured when all of it is new, or when something is and it is asked about often.
+        if (blocks == 16 || (blocks != 0 && ++region_doubts[region] == 64)) measure_region(region_x, region_y);
         const rhi::CompareOperation operation = draw->depth_stencil.compare;
         const bool nearer = keeps_nearer(operation);
         const float inset = targets.samples == 1 ? 0.5f : 0.125f;
@@ -190,10 +310,10 @@ struct TileRun {
         const float y = static_cast<float>(tile_y + (lower ? y1 : y0)) + (lower ? 1.0f - inset : inset);
         const std::int32_t key = depth_key(targets.depth_layout, depth_at(x, y), depth_low, depth_high);
         switch (operation) {
-            case rhi::CompareOperation::less: return key >= region_high[region];
-            case rhi::CompareOperation::less_or_equal: return key > region_high[region];
-            case rhi::CompareOperation::greater: return key <= region_low[region];
-            default: return key < region_low[region];
+            case rhi::CompareOperation::less: return key >= region_bounds[region];
+            case rhi::CompareOperation::less_or_equal: return key > region_bounds[region];
+            case rhi::CompareOperation::greater: return key <= region_bounds[region];
+            default: return key < region_bounds[region];
         }
     }
 
@@ -218,102 +338,106 @@ struct TileRun {
         return *primitive;
     }
 
-    /// Asks for the lines of the color targets in a region that is drawn to for the first time, and in the one behind
-    /// it, which is likely to follow: stores would wait for them one after another otherwise.
-    [[gnu::noinline]] void enter_region(std::uint32_t region) {
-        entered_regions |= 1u << region;
-        if (targets.samples > 1) return;
-        for (std::uint32_t next = region; next < region + 2 && next < regions_across * regions_across; ++next) {
-            if (fetched_regions >> next & 1) continue;
-            fetched_regions |= 1u << next;
-            const std::int32_t x = static_cast<std::int32_t>(next % regions_across) * 16;
-            const std::int32_t y = static_cast<std::int32_t>(next / regions_across) * 16;
-            if (x >= width) continue;
-            const std::int32_t rows = height - y < 16 ? height - y : 16;
-            for (std::uint32_t i = 0; i < draw->color_count; ++i) {
-                const ColorTarget& target = targets.colors[draw->colors[i].target];
-                const std::byte* line = target.data + static_cast<std::size_t>(tile_y + y) * target.row_stride +
-                                        static_cast<std::size_t>(tile_x + x) * target.texel_bytes;
-                for (std::int32_t row = 0; row < rows; ++row, line += target.row_stride)
-                    for (std::uint32_t byte = 0; byte < 16 * target.texel_bytes; byte += 64)
-                        __builtin_prefetch(line + byte, 1);
-            }
-        }
-    }
-
     /// The quads of a block of 4x4 pixels.
+    /// @param place    of the block
     /// @param live     pixels, 16 bits
     /// @param covered  for each pixel the samples that the primitive covers; null with one sample
     /// @param alive    and those that passed the tests so far
-    [[gnu::always_inline]] void append_block(std::uint32_t stream_index, std::int32_t x, std::int32_t y,
-                                             std::uint32_t place, std::uint32_t live, const std::uint8_t* covered,
-                                             const std::uint8_t* alive) {
+    [[gnu::always_inline]] void append_block(std::uint32_t stream_index, std::uint32_t place, std::uint32_t live,
+                                             const std::uint8_t* covered, const std::uint8_t* alive) {
         Stream& stream = memory.streams[stream_index];
-        if (stream.quads + 4 > stream_quads) flush_stream(stream_index);
         const std::uint32_t region = (place >> 10) * regions_across + (place >> 6 & 3);
         if ((entered_regions >> region & 1) == 0) enter_region(region);
         const PrimitiveData* const from = &current_primitive();
-        std::uint32_t next = stream.quads;
-        for (std::uint32_t quad = 0; quad < 4; ++quad) {
-            const std::uint32_t pixels = live >> (4 * quad) & 15;
-            stream.primitives[next] = from;
-            stream.x[next] = x + 2 * static_cast<std::int32_t>(quad & 1);
-            stream.y[next] = y + 2 * static_cast<std::int32_t>(quad >> 1);
-            stream.live[next] = pixels;
-            stream.places[next] = place + 4 * quad;
-            if (covered) {
+        const std::uint32_t first = stream.quads;
+        for (std::uint32_t quad = 0; quad < 4; ++quad) stream.primitives[first + quad] = from;
+        const std::uint32_t used = append_quads(stream, place, live);
+        if (covered) {
+            std::uint32_t next = first;
+            for (std::uint32_t quad = 0; quad < 4; ++quad) {
                 std::memcpy(stream.covered[next], covered + 4 * quad, 4);
                 std::memcpy(stream.alive[next], alive + 4 * quad, 4);
+                next += used >> quad & 1;
             }
-            next += pixels != 0;
         }
-        stream.quads = next;
+        if (stream.quads >= stream_quads) flush_stream(stream_index, stream_quads);
+    }
+    /// The same for the four blocks at the corners of two by two, with one sample; `live` may be zero.
+    /// @param regions  one bit for each that a pixel lies in
+    [[gnu::always_inline]] void append_four_blocks(std::uint32_t place, const std::uint32_t (&live)[4],
+                                                   std::uint32_t regions) {
+        for (std::uint32_t fresh = regions & ~entered_regions; fresh != 0; fresh &= fresh - 1)
+            enter_region(static_cast<std::uint32_t>(__builtin_ctz(fresh)));
+        Stream& stream = memory.streams[0];
+        const PrimitiveData* const from = &current_primitive();
+        for (std::uint32_t quad = 0; quad < 16; ++quad) stream.primitives[stream.quads + quad] = from;
+        for (std::uint32_t block = 0; block < 4; ++block)
+            append_quads(stream, place + four_blocks[block], live[block]);
+        if (stream.quads >= stream_quads) flush_stream(0, stream_quads);
+    }
+    /// @return the quads that have a pixel, one bit for each
+    NACRE_LANES_INLINE static std::uint32_t append_quads(Stream& stream, std::uint32_t place, std::uint32_t live) {
+        // All four, one behind the other, and then only those with a pixel count.
+        const Int4 pixels = (static_cast<std::int32_t>(live) >> Int4{0, 4, 8, 12}) & 15;
+        const Int4 entries =
+            (pixels << static_cast<int>(Stream::live_shift)) + (static_cast<std::int32_t>(place) + Int4{0, 4, 8, 12});
+        const std::uint32_t any = (live | live >> 1 | live >> 2 | live >> 3) & 0x1111;
+        const std::uint32_t used = (any | any >> 3 | any >> 6 | any >> 9) & 15;
+        store4(stream.places + stream.quads, __builtin_shuffle(entries, load4(quad_order[used])));
+        stream.quads += static_cast<std::uint32_t>(__builtin_popcount(used));
+        return used;
     }
 
     void flush() {
         for (std::uint32_t sample = 0; sample < targets.samples; ++sample)
-            if (memory.streams[sample].quads != 0) flush_stream(sample);
+            if (memory.streams[sample].quads != 0) flush_stream(sample, memory.streams[sample].quads);
     }
 
-    void flush_stream(std::uint32_t stream_index) {
+    /// Runs the fragment function for the first quads: all, or `stream_quads`.
+    void flush_stream(std::uint32_t stream_index, std::uint32_t quads) {
         Stream& stream = memory.streams[stream_index];
         const std::uint32_t quads_in_batch = job.lanes / 4;
-        const std::uint32_t count = (stream.quads + quads_in_batch - 1) / quads_in_batch;
-        for (std::uint32_t quad = stream.quads; quad % quads_in_batch != 0; ++quad) {
+        const std::uint32_t count = (quads + quads_in_batch - 1) / quads_in_batch;
+        for (std::uint32_t quad = quads; quad % quads_in_batch != 0; ++quad) {
             stream.primitives[quad] = stream.primitives[0];
-            stream.x[quad] = stream.x[0], stream.y[quad] = stream.y[0];
-            stream.places[quad] = stream.places[0];
-            stream.live[quad] = 0;
+            stream.places[quad] = stream.places[0] & Stream::place_mask;
             std::memset(stream.covered[quad], 0, 4), std::memset(stream.alive[quad], 0, 4);
         }
+        alignas(16) std::uint32_t places[stream_quads + 4];
         for (std::uint32_t i = 0; i < count; ++i)
-            fill_batch(memory.batches[i], stream, stream_index, i * quads_in_batch, quads_in_batch);
+            fill_batch(memory.batches[i], stream, stream_index, i * quads_in_batch, quads_in_batch,
+                       places + i * quads_in_batch);
         draw->fragment(draw->context, memory.batches, count);
         for (std::uint32_t i = 0; i < count; ++i) {
+            const std::uint32_t first = i * quads_in_batch;
             if (draw->plain_results)
-                write_plain(memory.batches[i], stream.places + i * quads_in_batch, quads_in_batch);
+                write_plain(memory.batches[i], places + first, quads_in_batch);
             else
-                resolve(memory.batches[i], stream, stream_index, i * quads_in_batch, quads_in_batch);
+                resolve(memory.batches[i], stream, stream_index, first, places + first, quads_in_batch);
         }
-        stream.quads = 0;
+        stream.quads -= quads;
+        if (stream.quads == 0) return;
+        std::memcpy(stream.primitives, stream.primitives + quads, 16 * sizeof(stream.primitives[0]));
+        std::memcpy(stream.places, stream.places + quads, 16 * sizeof(stream.places[0]));
+        if (targets.samples == 1) return;
+        std::memcpy(stream.covered, stream.covered + quads, 16 * sizeof(stream.covered[0]));
+        std::memcpy(stream.alive, stream.alive + quads, 16 * sizeof(stream.alive[0]));
     }
 
     [[gnu::always_inline]] void fill_batch(FragmentBatch& batch, const Stream& stream, std::uint32_t stream_index,
-                                           std::uint32_t first, std::uint32_t quads) {
+                                           std::uint32_t first, std::uint32_t quads, std::uint32_t* places) {
         std::memcpy(batch.primitives, stream.primitives + first, sizeof(batch.primitives));
-        std::memcpy(batch.x, stream.x + first, sizeof(batch.x));
-        std::memcpy(batch.y, stream.y + first, sizeof(batch.y));
-        batch.live = 0;
-        for (std::uint32_t quad = 0; quad < max_quads; ++quad)
-            batch.live |= quad < quads ? stream.live[first + quad] << (4 * quad) : 0;
-        batch.sample_index = stream_index;
+        const Int4 entries = load4(stream.places + first), place = entries & static_cast<int>(Stream::place_mask);
+        store4(places, place);
+        store4(batch.x, ((place >> 2) & 60) + ((place >> 1) & 2) + tile_x);
+        store4(batch.y, ((place >> 6) & 60) + ((place >> 2) & 2) + tile_y);
+        const Int4 pixels = (entries >> static_cast<int>(Stream::live_shift)) << Int4{0, 4, 8, 12};
+        batch.live = static_cast<std::uint32_t>(pixels[0]);
+        for (std::uint32_t quad = 1; quad < quads; ++quad) batch.live |= static_cast<std::uint32_t>(pixels[quad]);
+        if (targets.samples == 1) return;
         const bool single = draw->runs_per_sample;
-        batch.sample_x = single ? static_cast<float>(sample_offset_x[stream_index]) / subpixels : 0.5f;
-        batch.sample_y = single ? static_cast<float>(sample_offset_y[stream_index]) / subpixels : 0.5f;
-        store(batch.sample_mask_in, ints(single ? 1 << stream_index : 1));
-        if (draw->uses_centroid)
-            store(batch.centroid_x, floats(batch.sample_x)), store(batch.centroid_y, floats(batch.sample_y));
-        if (targets.samples == 1 || single) return;
+        set_samples(batch, stream_index, single);
+        if (single) return;
         for (std::uint32_t lane = 0; lane < 4 * quads; ++lane) {
             const std::uint32_t bits = stream.covered[first + lane / 4][lane & 3];
             batch.sample_mask_in[lane] = bits;
@@ -325,55 +449,64 @@ struct TileRun {
             }
         }
     }
+    /// Where the invocations of a batch run.
+    /// @param single  at the place of that sample
+    static void set_samples(FragmentBatch& batch, std::uint32_t sample, bool single) {
+        batch.sample_index = sample;
+        batch.sample_x = single ? static_cast<float>(sample_offset_x[sample]) / subpixels : 0.5f;
+        batch.sample_y = single ? static_cast<float>(sample_offset_y[sample]) / subpixels : 0.5f;
+        store(batch.sample_mask_in, ints(single ? 1 << sample : 1));
+        store(batch.centroid_x, floats(batch.sample_x)), store(batch.centroid_y, floats(batch.sample_y));
+    }
 
     /// The frequent case of `resolve`: one sample, tested before, nothing blended.
     void write_plain(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t quads) {
         const std::uint32_t live = batch.live;
-        // Quads of unfilled batches repeat others, without a live pixel.
-        bool inside = width % 2 == 0 && height % 2 == 0, block = quads == 4 && live == 0xffff && places[0] % 16 == 0;
-        for (std::uint32_t quad = 0; quad < quads; ++quad) block = block && places[quad] == places[0] + 4 * quad;
-        alignas(64) std::uint32_t keep[16];
-        store(keep, select(lanes_of(live), ints(0), ints(-1)));
-        std::size_t offsets[4] = {};
-        std::uint32_t row_stride = 0, texel_bytes = 0;
+        struct Words {
+            const std::uint32_t* from;
+            std::uint32_t offset;
+        };
+        Words words[8 * 4];
+        std::uint32_t count = 0;
+        alignas(64) std::uint32_t packed[8][4][16];
         for (std::uint32_t i = 0; i < draw->color_count; ++i) {
             const ColorPlan& plan = draw->colors[i];
             const ColorTarget& target = targets.colors[plan.target];
-            alignas(64) std::uint32_t packed[4][16];
-            const std::uint32_t(*words)[16] = batch.colors[plan.output];
+            const std::uint32_t(*from)[16] = batch.colors[plan.output];
             if (!plan.as_it_is) {
-                pack_colors(plan, target, *job.srgb, batch, packed);
-                words = packed;
+                pack_colors(plan, target, *job.srgb, batch, packed[i]);
+                from = packed[i];
             }
-            // Most targets of a pass have rows of the same size.
-            if (target.row_stride != row_stride || target.texel_bytes != texel_bytes) {
-                row_stride = target.row_stride, texel_bytes = target.texel_bytes;
-                for (std::uint32_t quad = 0; quad < 4; ++quad)
-                    offsets[quad] = static_cast<std::size_t>(batch.y[quad]) * row_stride +
-                                    static_cast<std::size_t>(batch.x[quad]) * texel_bytes;
-            }
-            QuadRows rows;
-            for (std::uint32_t quad = 0; quad < 4; ++quad) rows.top[quad] = target.data + offsets[quad];
-            if (target.texel_bytes == 4 && inside) {
-                if (block)
-                    store_block_words(rows.top[0], target.row_stride, words[0]);
-                else
-                    store_words(rows, target.row_stride, quads, words[0], keep);
-                continue;
-            }
-            for (std::uint32_t quad = 0; quad < quads; ++quad)
-                if (const std::uint32_t pixels = live >> (4 * quad) & 15)
-                    store_quad(rows.top[quad], target.row_stride, target.texel_bytes, pixels, words, 4 * quad);
+            const std::uint32_t offset = color_offset(target, 0);
+            for (std::uint32_t word = 0; word < target.words; ++word)
+                words[count++] = {from[word], offset + 16 * word};
         }
+        if (quads == 4 && live == 0xffff && is_block(places)) {
+            std::uint32_t* const to = colors_at(places[0]);
+            for (std::uint32_t i = 0; i < count; ++i) store(to + words[i].offset, load(words[i].from));
+            return;
+        }
+        alignas(64) std::int32_t keep[16];
+        store(keep, select(lanes_of(live), ints(0), ints(-1)));
+        // Quads of unfilled batches repeat others, without a live pixel.
+        for (std::uint32_t quad = 0; quad < quads; ++quad) {
+            std::uint32_t* const to = colors_at(places[quad]);
+            const Int4 kept = load4(keep + 4 * quad);
+            for (std::uint32_t i = 0; i < count; ++i) store_quad(to + words[i].offset, words[i].from + 4 * quad, kept);
+        }
+    }
+    /// Whether four quads are those of one block, in their order.
+    static bool is_block(const std::uint32_t* places) {
+        return places[0] % 16 == 0 && places[1] == places[0] + 4 && places[2] == places[0] + 8 &&
+               places[3] == places[0] + 12;
     }
 
     /// Tests and writes the results of one batch.
     void resolve(const FragmentBatch& batch, const Stream& stream, std::uint32_t stream_index, std::uint32_t first_quad,
-                 std::uint32_t quads) {
+                 const std::uint32_t* places, std::uint32_t quads) {
         const std::uint32_t used = quads == 4 ? 0xffffu : (1u << (4 * quads)) - 1;
         const std::uint32_t live = batch.live & used;
         if (live == 0) return;
-        const std::uint32_t* const places = stream.places + first_quad;
         const bool several = targets.samples > 1 && !draw->runs_per_sample;
         const std::uint32_t first = several ? 0 : stream_index, end = several ? targets.samples : stream_index + 1;
         bool conflict = false;
@@ -404,7 +537,7 @@ struct TileRun {
         }
         if (any == 0) return;
         for (std::uint32_t i = 0; i < draw->color_count; ++i)
-            write_color(draw->colors[i], batch, masks, first, end, conflict);
+            write_color(draw->colors[i], batch, places, quads, masks, first, end, conflict);
     }
 
     std::uint32_t late_test(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t sample,
@@ -456,8 +589,9 @@ struct TileRun {
         return passed;
     }
 
-    void write_color(const ColorPlan& plan, const FragmentBatch& batch, const std::uint32_t (&masks)[most_samples],
-                     std::uint32_t first, std::uint32_t end, bool conflict) {
+    void write_color(const ColorPlan& plan, const FragmentBatch& batch, const std::uint32_t* places,
+                     std::uint32_t quads, const std::uint32_t (&masks)[most_samples], std::uint32_t first,
+                     std::uint32_t end, bool conflict) {
         const ColorTarget& target = targets.colors[plan.target];
         alignas(64) std::uint32_t words[4][16];
         const bool reads = plan.blends || plan.partial;
@@ -465,30 +599,29 @@ struct TileRun {
         for (std::uint32_t sample = first; sample < end; ++sample) {
             const std::uint32_t mask = masks[sample];
             if (mask == 0) continue;
-            QuadRows rows;
-            for (std::uint32_t quad = 0; quad < 4; ++quad)
-                if (mask >> (4 * quad) & 15)
-                    rows.top[quad] = target.data + sample * target.sample_stride +
-                                     static_cast<std::size_t>(batch.y[quad]) * target.row_stride +
-                                     static_cast<std::size_t>(batch.x[quad]) * target.texel_bytes;
-            const auto store_all = [&](std::uint32_t lanes) {
-                for (std::uint32_t quad = 0; quad < 4; ++quad)
-                    if (const std::uint32_t pixels = lanes >> (4 * quad) & 15)
-                        store_quad(rows.top[quad], target.row_stride, target.texel_bytes, pixels, words, 4 * quad);
+            const std::uint32_t offset = color_offset(target, sample);
+            const auto write = [&](std::uint32_t first_quad, std::uint32_t end_quad) {
+                if (reads) {
+                    alignas(64) std::uint32_t old[4][16] = {};
+                    for (std::uint32_t quad = first_quad; quad < end_quad; ++quad)
+                        for (std::uint32_t word = 0; word < target.words; ++word)
+                            store4(old[word] + 4 * quad, load4(colors_at(places[quad]) + offset + 16 * word));
+                    blend_colors(*draw, plan, target, *job.srgb, batch, old, words);
+                }
+                alignas(64) std::int32_t keep[16];
+                store(keep, select(lanes_of(mask), ints(0), ints(-1)));
+                for (std::uint32_t quad = first_quad; quad < end_quad; ++quad)
+                    for (std::uint32_t word = 0; word < target.words; ++word)
+                        store_quad(colors_at(places[quad]) + offset + 16 * word, words[word] + 4 * quad,
+                                   load4(keep + 4 * quad));
             };
-            if (!reads) {
-                store_all(mask);
-            } else if (!conflict) {
-                blend_colors(*draw, plan, target, *job.srgb, batch, rows, mask, words);
-                store_all(mask);
-            } else {
-                // Several triangles in one pixel of the batch: each must see what the one before left.
-                for (std::uint32_t quad = 0; quad < 4; ++quad)
-                    if (const std::uint32_t lanes = mask & (15u << (4 * quad))) {
-                        blend_colors(*draw, plan, target, *job.srgb, batch, rows, lanes, words);
-                        store_all(lanes);
-                    }
+            if (!reads || !conflict) {
+                write(0, quads);
+                continue;
             }
+            // Several triangles in one pixel of the batch: each must see what the one before left.
+            for (std::uint32_t quad = 0; quad < quads; ++quad)
+                if (mask >> (4 * quad) & 15) write(quad, quad + 1);
         }
     }
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/backends/cpu/fake_rasterizer.h"
 
+#include <cstring>
+
 namespace nacre::cpu {
 
 std::function<void(const RenderTargets&, const FakeDraw&)> FakeRaster::paint;
@@ -30,12 +32,34 @@ struct Rasterizer::State {
     }
 };
 
+namespace {
+
+void fill(const ImageLevel& level, const RenderTargets& targets, const std::byte* texel, std::size_t texel_bytes) {
+    for (std::uint32_t sample = 0; sample < targets.samples; ++sample)
+        for (std::uint32_t y = 0; y < targets.height; ++y)
+            for (std::uint32_t x = 0; x < targets.width; ++x)
+                std::memcpy(level.data + sample * level.sample_stride + std::size_t{y} * level.row_stride +
+                                x * texel_bytes,
+                            texel, texel_bytes);
+}
+
+}  // namespace
+
 Rasterizer::Rasterizer(Scheduler&, std::uint32_t, const RasterizerOptions&) : state_(std::make_unique<State>()) {}
 Rasterizer::~Rasterizer() = default;
 
 void Rasterizer::begin_pass(const RenderTargets& targets) {
     state_->targets = targets;
     state_->passed = 0;
+    for (std::size_t i = 0; i < targets.color_clears.size(); ++i)
+        if (targets.color_clears[i])
+            fill(targets.colors[i].levels[0], targets, targets.color_clears[i]->data(), targets.colors[i].texel_bytes);
+    const ImageView& depth = targets.depth_stencil;
+    if (targets.depth_clear) fill(depth.levels[0], targets, targets.depth_clear->data(), depth.texel_bytes);
+    if (targets.stencil_clear && depth.stencil_levels[0].data) {
+        const auto stencil = static_cast<std::byte>(*targets.stencil_clear);
+        fill(depth.stencil_levels[0], targets, &stencil, 1);
+    }
     FakeRaster::passes.push_back(targets);
 }
 void Rasterizer::draw(const DrawState& state, const DrawCall& call) { state_->collected.push_back({state, call, {}}); }

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
 #include "backends/cpu/compiler/math/term.h"
 
 namespace nacre::cpu {
@@ -8,6 +10,21 @@ llvm::Value* Math::float_to_int(Value* x, unsigned bits, bool is_signed) {
     Term number(emission, x);
     if (number.element()->isHalfTy()) number = convert(number, builder_.getFloatTy());
     llvm::Type* result = number.type_of(builder_.getIntNTy(bits));
+    if (number.type()->isVectorTy()) {
+        // The intrinsic becomes scalar code, lane by lane (LLVM 19). The instruction's result is poison out of range,
+        // which is never chosen.
+        const auto constant = [&](const llvm::APInt& value) { return number.with(llvm::ConstantInt::get(result, value)); };
+        const double limit = std::ldexp(1.0, static_cast<int>(is_signed ? bits - 1 : bits));
+        const Term whole = number.with(is_signed ? emission.builder.CreateFPToSI(number.value(), result)
+                                                 : emission.builder.CreateFPToUI(number.value(), result));
+        const Term largest =
+            constant(is_signed ? llvm::APInt::getSignedMaxValue(bits) : llvm::APInt::getMaxValue(bits));
+        const Term low = constant(is_signed ? llvm::APInt::getSignedMinValue(bits) : llvm::APInt::getZero(bits));
+        const Term bounded = select(number < limit, whole, largest);
+        if (!is_signed) return select(number > 0.0, bounded, low).value();
+        return select(is_nan(number), constant(llvm::APInt::getZero(bits)), select(number >= -limit, bounded, low))
+            .value();
+    }
     const llvm::Intrinsic::ID id = is_signed ? llvm::Intrinsic::fptosi_sat : llvm::Intrinsic::fptoui_sat;
     return emission.builder.CreateIntrinsic(id, {result, number.type()}, {number.value()});
 }

@@ -147,6 +147,9 @@ NACRE_INLINE Floats<W> difference_y(Floats<W> v) {
 /// 16-bit floats in the low half of each lane. Without arithmetic on denormals, which some code switches off.
 template <int W>
 NACRE_INLINE Floats<W> halves_to_floats(Ints<W> half) {
+#ifdef __F16C__
+    return halves_to_floats_natively<W>(half);
+#else
     const Ints<W> sign = (half & 0x8000) << 16, magnitude = half & 0x7fff, moved = magnitude << 13;
     const Ints<W> tiny = (Ints<W>)(to_floats<W>(magnitude) * 0x1p-24f);
     const Ints<W> not_finite = moved | (magnitude > 0x7c00 ? splat<W>(0x7fc00000) : splat<W>(0x7f800000));
@@ -154,6 +157,7 @@ NACRE_INLINE Floats<W> halves_to_floats(Ints<W> half) {
     result = magnitude < 0x400 ? tiny : result;
     result = magnitude >= 0x7c00 ? not_finite : result;
     return (Floats<W>)(result | sign);
+#endif
 }
 
 /// The other way, for floats of a 5-bit exponent and `mantissa_bits` (10, 6 or 5): magnitude only, rounded to nearest
@@ -173,6 +177,16 @@ NACRE_INLINE Ints<W> floats_to_small(Floats<W> value, std::int32_t mantissa_bits
     const Ints<W> nan =
         splat<W>(infinity | (1 << (mantissa_bits - 1))) | ((bits >> dropped) & ((1 << mantissa_bits) - 1));
     return bits > 0x7f800000 ? nan : result;
+}
+
+/// 16-bit floats with their sign, rounded to nearest even; overflow gives infinity.
+template <int W>
+NACRE_INLINE Ints<W> floats_to_halves(Floats<W> value) {
+#ifdef __F16C__
+    return floats_to_halves_natively<W>(value);
+#else
+    return floats_to_small<W>(value, 10, false) | (Ints<W>)(((Uints<W>)value >> 16) & 0x8000u);
+#endif
 }
 
 }  // namespace

@@ -13,23 +13,27 @@ NACRE_INLINE void border_values(rhi::BorderColor color, float& rgb, float& alpha
     alpha = color == rhi::BorderColor::transparent_black ? 0.0f : 1.0f;
 }
 
-/// Weighted mean of a footprint.
+/// Weighted mean of a footprint of two texels or more.
 template <int W, Codec C>
 [[gnu::noinline]] void filter_taps(const Source& source, const Taps<W>& taps, rhi::BorderColor border, Floats<W>* out) {
     const FormatPlan& plan = *source.plan;
     const int channels = raw_channels<C>(plan);
     Floats<W> sum[4] = {};
-    for (int tap = 0; tap < taps.count; ++tap) {
-        Floats<W> texel[4];
-        load_raw<W, C>(source, taps.places[tap], texel);
-        if (taps.has_border) {
-            float rgb, alpha;
-            border_values(border, rgb, alpha);
-            for (int c = 0; c < channels; ++c) {
-                texel[c] = taps.is_border[tap] ? splat<W>((c == 3 ? alpha : rgb) * raw_scale<C>(plan, c)) : texel[c];
+    for (int first = 0; first < taps.count; first += 2) {
+        Floats<W> texels[2][4];
+        load_two_raw<W, C>(source, taps.places[first], taps.places[first + 1], texels);
+        for (int i = 0; i < 2; ++i) {
+            const int tap = first + i;
+            Floats<W>* const texel = texels[i];
+            if (taps.has_border) {
+                float rgb, alpha;
+                border_values(border, rgb, alpha);
+                for (int c = 0; c < channels; ++c) {
+                    texel[c] = taps.is_border[tap] ? splat<W>((c == 3 ? alpha : rgb) * raw_scale<C>(plan, c)) : texel[c];
+                }
             }
+            for (int c = 0; c < channels; ++c) sum[c] = sum[c] + taps.weights[tap] * texel[c];
         }
-        for (int c = 0; c < channels; ++c) sum[c] = sum[c] + taps.weights[tap] * texel[c];
     }
     for (int c = 0; c < channels; ++c) out[c] = sum[c];
     finish_raw<W, C>(plan, out);
@@ -169,6 +173,36 @@ template <int W>
                        out);
 }
 
+/// Mean of samples along the longer axis of an anisotropic footprint: at i / (N + 1) - 1/2 of it, i = 1 ... N.
+template <int W, typename Sample>
+NACRE_INLINE void average_along_axis(const LevelOfDetail<W>& detail, std::uint32_t live, Floats<W>* out, Sample sample) {
+    Floats<W> sum[4] = {};
+    for (int i = 1; i <= 16; ++i) {
+        const Ints<W> takes_part = detail.sample_count >= static_cast<float>(i);
+        if ((mask_bits<W>(takes_part) & live) == 0) break;
+        Floats<W> once[4];
+        sample(static_cast<float>(i) / (detail.sample_count + 1.0f) - 0.5f, once);
+        for (int c = 0; c < 4; ++c) sum[c] = takes_part ? sum[c] + once[c] : sum[c];
+    }
+    for (int c = 0; c < 4; ++c) out[c] = sum[c] / detail.sample_count;
+}
+
+/// Visits every level that lanes read, once for all of them, from the finest on, so that a lane's sum does not depend on its
+/// neighbors: `visit(level, lanes, their weights)`.
+template <int W, typename Visit>
+NACRE_INLINE void add_levels(const Invocation& call, Ints<W> level, Floats<W> next_weight, Visit visit) {
+    const Ints<W> has_next = next_weight > 0.0f;
+    std::uint32_t pending = call.live, pending_next = mask_bits<W>(has_next) & call.live;
+    for (std::int32_t m = 0; (pending | pending_next) != 0; ++m) {
+        const Ints<W> is_first = level == m, is_next = (level == m - 1) & has_next;
+        const std::uint32_t here = (mask_bits<W>(is_first) & pending) | (mask_bits<W>(is_next) & pending_next);
+        if (here == 0) continue;
+        pending &= ~mask_bits<W>(is_first);
+        pending_next &= ~mask_bits<W>(is_next);
+        visit(m, mask_of_bits<W>(here), is_first ? 1.0f - next_weight : next_weight);
+    }
+}
+
 /// One level with the filter's full footprint.
 template <int W>
 NACRE_INLINE void sample_level(const Sampling<W>& sampling, const LevelOfDetail<W>& detail, std::uint32_t level,
@@ -180,22 +214,158 @@ NACRE_INLINE void sample_level(const Sampling<W>& sampling, const LevelOfDetail<
     }
     if (detail.is_elliptical) return sample_ellipse<W>(sampling, detail, source, level, sampling.call->live, out);
     if (!detail.is_anisotropic) return sample_once<W>(sampling, source, sampling.coordinates, is_linear, out);
-    // Samples at i / (N + 1) - 1/2 of the longer axis, i = 1 ... N.
-    Floats<W> sum[4] = {};
-    for (int i = 1; i <= 16; ++i) {
-        const Ints<W> takes_part = detail.sample_count >= static_cast<float>(i);
-        if ((mask_bits<W>(takes_part) & sampling.call->live) == 0) break;
-        const Floats<W> along = static_cast<float>(i) / (detail.sample_count + 1.0f) - 0.5f;
+    average_along_axis<W>(detail, sampling.call->live, out, [&](Floats<W> along, Floats<W>* once) {
         Floats<W> moved[3];
         for (int axis = 0; axis < 2; ++axis) {
             moved[axis] = detail.sample_count > 1.0f ? sampling.coordinates[axis] + along * detail.axis[axis]
                                                      : sampling.coordinates[axis];
         }
-        Floats<W> once[4];
         sample_once<W>(sampling, source, moved, is_linear, once);
-        for (int c = 0; c < 4; ++c) sum[c] = takes_part ? sum[c] + once[c] : sum[c];
+    });
+}
+
+/// Samples that are most common go a short way, with the same results: 2D images and arrays of them, in layouts whose texels
+/// are taken apart without choices, without borders, offsets and comparisons.
+template <int W>
+struct PlainSampling {
+    const Invocation* call;
+    Floats<W> s, t;
+    Ints<W> slice;
+    rhi::AddressMode u, v;
+    bool is_linear;
+};
+
+template <int W, Codec C>
+[[gnu::noinline]] void sample_plain_once(const PlainSampling<W>& sampling, const Source& source, Floats<W> s, Floats<W> t,
+                                         Floats<W>* out) {
+    const FormatPlan& plan = *source.plan;
+    constexpr int bytes = 4 * raw_words<C>;
+    const Ints<W> slice = sampling.slice * static_cast<std::int32_t>(source.slice_stride);
+    if (!sampling.is_linear) {
+        const AxisTaps<W> x = nearest_axis<W>(s, source.width, sampling.u, nullptr);
+        const AxisTaps<W> y = nearest_axis<W>(t, source.height, sampling.v, nullptr);
+        Place<W> place;
+        place.offset = x.first * bytes + y.first * source.row_stride + slice;
+        load_raw<W, C>(source, place, out);
+    } else {
+        constexpr int channels = C == Codec::word ? 1 : 4;
+        const AxisTaps<W> x = linear_axis<W>(s, source.width, sampling.u, nullptr);
+        const AxisTaps<W> y = linear_axis<W>(t, source.height, sampling.v, nullptr);
+        const Ints<W> left = x.first * bytes, right = x.second * bytes;
+        Floats<W> sum[4] = {};
+        for (int row = 0; row < 2; ++row) {
+            const Ints<W> above = (row == 0 ? y.first : y.second) * source.row_stride + slice;
+            const Floats<W> weight_y = row == 0 ? 1.0f - y.weight : y.weight;
+            Place<W> first, second;
+            first.offset = left + above, second.offset = right + above;
+            Floats<W> texels[2][4];
+            load_two_raw<W, C>(source, first, second, texels);
+            const Floats<W> weights[2] = {(1.0f - x.weight) * weight_y, x.weight * weight_y};
+            for (int i = 0; i < 2; ++i) {
+                for (int c = 0; c < channels; ++c) sum[c] = sum[c] + weights[i] * texels[i][c];
+            }
+        }
+        for (int c = 0; c < channels; ++c) out[c] = sum[c];
     }
-    for (int c = 0; c < 4; ++c) out[c] = sum[c] / detail.sample_count;
+    finish_raw<W, C>(plan, out);
+}
+
+template <int W, Codec C>
+NACRE_INLINE void sample_plain_level(const PlainSampling<W>& sampling, const LevelOfDetail<W>& detail, std::uint32_t level,
+                                     Floats<W>* out) {
+    Source source;
+    if (!make_source(*sampling.call->image, level, source)) {
+        for (int c = 0; c < 4; ++c) out[c] = splat<W>(0.0f);
+        return;
+    }
+    if (!detail.is_anisotropic) return sample_plain_once<W, C>(sampling, source, sampling.s, sampling.t, out);
+    average_along_axis<W>(detail, sampling.call->live, out, [&](Floats<W> along, Floats<W>* once) {
+        const Ints<W> is_moved = detail.sample_count > 1.0f;
+        sample_plain_once<W, C>(sampling, source, is_moved ? sampling.s + along * detail.axis[0] : sampling.s,
+                                is_moved ? sampling.t + along * detail.axis[1] : sampling.t, once);
+    });
+}
+
+/// False: not all lanes are filtered in the same way, and nothing was done.
+template <int W, Codec C>
+[[gnu::noinline]] bool sample_plain_levels(PlainSampling<W>& sampling) {
+    const Invocation& call = *sampling.call;
+    const ImageView& image = *call.image;
+    const rhi::SamplerDesc& sampler = call.sampler->desc;
+    const Ints<W> live = mask_of_bits<W>(call.live);
+    LevelOfDetail<W> detail;
+    Ints<W> level = splat<W>(0);
+    Floats<W> next_weight = splat<W>(0.0f);
+    sampling.is_linear = sampler.magnify == rhi::Filter::linear;
+    if (image.mip_count > 1 || sampler.magnify != sampler.minify || sampler.max_anisotropy > 1.0f) {
+        const Floats<W> coordinates[2] = {sampling.s, sampling.t};
+        level_of_detail<W>(call, coordinates, nullptr, 2, detail);
+        select_levels<W>(detail.lambda, image.mip_count, sampler.mip == rhi::Filter::linear, level, next_weight);
+        if (sampler.magnify != sampler.minify) {
+            const std::uint32_t magnified = mask_bits<W>(detail.lambda <= 0.0f) & call.live;
+            if (magnified != 0 && magnified != call.live) return false;
+            if (magnified == 0) sampling.is_linear = !sampling.is_linear;
+        }
+    }
+    Floats<W> out[4];
+    const Ints<W> has_next = next_weight > 0.0f;
+    const std::uint32_t next_bits = mask_bits<W>(has_next) & call.live;
+    const std::int32_t first = level[first_bit(call.live)];
+    const bool is_one_level = (mask_bits<W>(level == first) & call.live) == call.live;
+    sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(first), out);
+    if (is_one_level && next_bits == 0) {
+        write_result<W>(call, out, live);
+        return true;
+    }
+    if (is_one_level) {
+        Floats<W> next[4];
+        sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(first) + 1, next);
+        for (int c = 0; c < 4; ++c) {
+            const Floats<W> sum = (splat<W>(0.0f) + out[c] * (1.0f - next_weight)) + next[c] * next_weight;
+            out[c] = has_next ? sum : out[c];
+        }
+        write_result<W>(call, out, live);
+        return true;
+    }
+    for (int c = 0; c < 4; ++c) out[c] = splat<W>(0.0f);
+    add_levels<W>(call, level, next_weight, [&](std::int32_t m, Ints<W> mask, Floats<W> weight) {
+        Floats<W> value[4];
+        sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(m), value);
+        for (int c = 0; c < 4; ++c) {
+            const Floats<W> sum = has_next ? out[c] + value[c] * weight : value[c];
+            out[c] = mask ? sum : out[c];
+        }
+    });
+    write_result<W>(call, out, live);
+    return true;
+}
+
+/// False: the sample is not plain, and nothing was done.
+template <int W>
+NACRE_INLINE bool sample_plain(const Invocation& call) {
+    const ImageView& image = *call.image;
+    const rhi::SamplerDesc& sampler = call.sampler->desc;
+    const bool is_array = image.dimension == rhi::ViewDimension::d2_array;
+    if (!is_array && image.dimension != rhi::ViewDimension::d2) return false;
+    if (call.has(image_offset) || call.has(image_compare) || call.has(image_integer)) return false;
+    if (call.sampler->is_elliptical && sampler.max_anisotropy > 1.0f) return false;
+    if (sampler.address_u == rhi::AddressMode::clamp_to_border || sampler.address_v == rhi::AddressMode::clamp_to_border)
+        return false;
+    // The finest level reaches farthest.
+    Source source;
+    if (!make_source(image, 0, source) || source.codec > Codec::float4) return false;
+    PlainSampling<W> sampling;
+    sampling.call = &call;
+    sampling.s = call.floats<W>(call.arguments->coordinates[0]);
+    sampling.t = call.floats<W>(call.arguments->coordinates[1]);
+    sampling.slice = splat<W>(0);
+    if (is_array) sampling.slice = array_layer<W>(call.floats<W>(call.arguments->coordinates[2]), image.layer_count);
+    sampling.u = sampler.address_u, sampling.v = sampler.address_v;
+    bool is_done = false;
+    visit_codec(source.codec, [&]<Codec C>() {
+        if constexpr (raw_words<C> != 0) is_done = sample_plain_levels<W, C>(sampling);
+    });
+    return is_done;
 }
 
 /// False where the result of every lane is zero.
@@ -212,6 +382,7 @@ NACRE_INLINE bool can_sample(const Invocation& call) {
 template <int W>
 [[gnu::noinline]] void sample_image(const Invocation& call) {
     if (!can_sample(call)) return write_zeros<W>(call);
+    if (sample_plain<W>(call)) return;
     const ImageView& image = *call.image;
     const rhi::SamplerDesc& sampler = call.sampler->desc;
     const bool is_integer = call.has(image_integer);
@@ -249,18 +420,9 @@ template <int W>
         return write_result<W>(call, out, mask_of_bits<W>(call.live));
     }
     for (int c = 0; c < 4; ++c) out[c] = splat<W>(0.0f);
-    // Every level once for all lanes that read it, from the finest on, so that a lane's sum does not depend on its
-    // neighbors.
-    std::uint32_t pending = call.live, pending_next = next_bits;
-    for (std::int32_t m = 0; (pending | pending_next) != 0; ++m) {
-        const Ints<W> is_first = level == m, is_next = (level == m - 1) & has_next;
-        const std::uint32_t here = (mask_bits<W>(is_first) & pending) | (mask_bits<W>(is_next) & pending_next);
-        if (here == 0) continue;
-        pending &= ~mask_bits<W>(is_first);
-        pending_next &= ~mask_bits<W>(is_next);
-        const Floats<W> weight = is_first ? 1.0f - next_weight : next_weight;
+    add_levels<W>(call, level, next_weight, [&](std::int32_t m, Ints<W> here, Floats<W> weight) {
         for (int filter = 0; filter < 2; ++filter) {
-            const std::uint32_t lanes = here & (filter == 0 ? nearest_bits : linear_bits);
+            const std::uint32_t lanes = mask_bits<W>(here) & (filter == 0 ? nearest_bits : linear_bits);
             if (lanes == 0) continue;
             const Ints<W> mask = mask_of_bits<W>(lanes);
             Floats<W> value[4];
@@ -271,7 +433,7 @@ template <int W>
                 out[c] = mask ? sum : out[c];
             }
         }
-    }
+    });
     write_result<W>(call, out, mask_of_bits<W>(call.live));
 }
 

@@ -29,6 +29,35 @@ using Ints = typename Lanes<W>::I;
 template <int W>
 using Uints = typename Lanes<W>::U;
 
+/// The even and the odd elements of two vectors that follow each other.
+template <int W>
+NACRE_INLINE void split_pairs(Ints<W> low, Ints<W> high, Ints<W>& even, Ints<W>& odd) {
+    if constexpr (W == 4) {
+        even = __builtin_shufflevector(low, high, 0, 2, 4, 6);
+        odd = __builtin_shufflevector(low, high, 1, 3, 5, 7);
+    } else if constexpr (W == 8) {
+        even = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14);
+        odd = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15);
+    } else {
+        even = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+        odd = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+    }
+}
+/// The other way.
+template <int W>
+NACRE_INLINE void join_pairs(Ints<W> even, Ints<W> odd, Ints<W>& low, Ints<W>& high) {
+    if constexpr (W == 4) {
+        low = __builtin_shufflevector(even, odd, 0, 4, 1, 5);
+        high = __builtin_shufflevector(even, odd, 2, 6, 3, 7);
+    } else if constexpr (W == 8) {
+        low = __builtin_shufflevector(even, odd, 0, 8, 1, 9, 2, 10, 3, 11);
+        high = __builtin_shufflevector(even, odd, 4, 12, 5, 13, 6, 14, 7, 15);
+    } else {
+        low = __builtin_shufflevector(even, odd, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+        high = __builtin_shufflevector(even, odd, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+    }
+}
+
 /// The 32-bit words at base + offset[lane].
 template <int W>
 NACRE_INLINE Ints<W> gather_words(const std::byte* base, Ints<W> offset) {
@@ -49,6 +78,41 @@ NACRE_INLINE Ints<W> gather_words(const std::byte* base, Ints<W> offset) {
         words[lane] = word;
     }
     return words;
+}
+
+/// The words at base + offset[lane] and the words behind them: one access of 64 bits for each lane, which costs as much as
+/// one of 32.
+template <int W>
+NACRE_INLINE void gather_pairs(const std::byte* base, Ints<W> offset, Ints<W>& first, Ints<W>& second) {
+#ifdef __AVX512F__
+    if constexpr (W == 16) {
+        const auto half = [&](Ints<8> at) {
+            return (Ints<W>)_mm512_mask_i32gather_epi64(_mm512_setzero_si512(), 0xff, (__m256i)at, base, 1);
+        };
+        const Ints<W> low = half(__builtin_shufflevector(offset, offset, 0, 1, 2, 3, 4, 5, 6, 7));
+        const Ints<W> high = half(__builtin_shufflevector(offset, offset, 8, 9, 10, 11, 12, 13, 14, 15));
+        split_pairs<W>(low, high, first, second);
+        return;
+    }
+#endif
+#ifdef __AVX2__
+    if constexpr (W == 8) {
+        const auto at = (__m256i)offset;
+        const auto* words = reinterpret_cast<const long long*>(base);
+        const auto low = (Ints<W>)_mm256_i32gather_epi64(words, _mm256_castsi256_si128(at), 1);
+        const auto high = (Ints<W>)_mm256_i32gather_epi64(words, _mm256_extracti128_si256(at, 1), 1);
+        split_pairs<W>(low, high, first, second);
+        return;
+    }
+    if constexpr (W == 4) {
+        const auto both = (Ints<8>)_mm256_i32gather_epi64(reinterpret_cast<const long long*>(base), (__m128i)offset, 1);
+        first = __builtin_shufflevector(both, both, 0, 2, 4, 6);
+        second = __builtin_shufflevector(both, both, 1, 3, 5, 7);
+        return;
+    }
+#endif
+    first = gather_words<W>(base, offset);
+    second = gather_words<W>(base + 4, offset);
 }
 
 /// Texels of 1 or 2 bytes at base + offset[lane], in the low bits; what is above does not matter. Gathers read aligned
@@ -104,6 +168,55 @@ NACRE_INLINE Floats<W> square_root(Floats<W> x) {
     for (int lane = 0; lane < W; ++lane) root[lane] = __builtin_sqrtf(x[lane]);
     return root;
 }
+
+/// x / divisor as IEEE 754 rounds it; the divisor is a whole number below 2^24 and |x| is 0 or above 2^-60. By the reciprocal
+/// and the exact remainder where there are fused operations: Markstein, "Computation of elementary functions on the IBM RISC
+/// System/6000 processor", 1990, theorem 7. Zero comes out with the sign +.
+template <int W>
+NACRE_INLINE Floats<W> quotient(Floats<W> x, float divisor) {
+#ifdef __FMA__
+    const float reciprocal = 1.0f / divisor;
+    const Floats<W> estimate = x * reciprocal;
+    const auto fused = [](Floats<W> a, Floats<W> b, Floats<W> c) -> Floats<W> {
+#ifdef __AVX512F__
+        if constexpr (W == 16) return (Floats<W>)_mm512_maskz_fmadd_ps(0xffff, (__m512)a, (__m512)b, (__m512)c);
+#endif
+        if constexpr (W == 8) return (Floats<W>)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
+        if constexpr (W == 4) return (Floats<W>)_mm_fmadd_ps((__m128)a, (__m128)b, (__m128)c);
+    };
+    const Floats<W> rest = fused(estimate, Floats<W>{} - divisor, x);
+    return fused(rest, Floats<W>{} + reciprocal, estimate);
+#else
+    return x / divisor + 0.0f;
+#endif
+}
+
+#ifdef __F16C__
+// The processor's conversions of halves, whose bits are those of the arithmetic in lane_math.h: NaN are made quiet and keep
+// what fits of their payload, and no mode of the processor flushes a subnormal half.
+template <int W>
+NACRE_INLINE Floats<W> halves_to_floats_natively(Ints<W> half) {
+#ifdef __AVX512F__
+    if constexpr (W == 16)
+        return (Floats<W>)_mm512_maskz_cvtph_ps(0xffff, _mm512_maskz_cvtepi32_epi16(0xffff, (__m512i)half));
+#endif
+    if constexpr (W == 8) {
+        const auto words = (__m256i)half;
+        return (Floats<W>)_mm256_cvtph_ps(_mm_packus_epi32(_mm256_castsi256_si128(words), _mm256_extracti128_si256(words, 1)));
+    }
+    if constexpr (W == 4) return (Floats<W>)_mm_cvtph_ps(_mm_packus_epi32((__m128i)half, (__m128i)half));
+}
+template <int W>
+NACRE_INLINE Ints<W> floats_to_halves_natively(Floats<W> value) {
+#ifdef __AVX512F__
+    if constexpr (W == 16)
+        return (Ints<W>)_mm512_maskz_cvtepu16_epi32(0xffff, _mm512_maskz_cvtps_ph(0xffff, (__m512)value, _MM_FROUND_TO_NEAREST_INT));
+#endif
+    if constexpr (W == 8)
+        return (Ints<W>)_mm256_cvtepu16_epi32(_mm256_cvtps_ph((__m256)value, _MM_FROUND_TO_NEAREST_INT));
+    if constexpr (W == 4) return (Ints<W>)_mm_cvtepu16_epi32(_mm_cvtps_ph((__m128)value, _MM_FROUND_TO_NEAREST_INT));
+}
+#endif
 
 }  // namespace
 }  // namespace nacre::cpu::NACRE_KERNEL_NAMESPACE

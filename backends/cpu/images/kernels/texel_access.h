@@ -127,6 +127,39 @@ template <int W>
     write_result<W>(call, all, live);
 }
 
+/// Writes texels of N words in the lanes of `stored`, in the order of the lanes. Where eight lanes' texels (or all, if there
+/// are fewer) lie side by side they are written at once.
+template <int W, int N>
+NACRE_INLINE void write_texels(std::byte* base, Ints<W> offset, const Ints<W>* words, std::uint32_t stored) {
+    Ints<W> texels[N];
+    if constexpr (N == 1) {
+        texels[0] = words[0];
+    } else if constexpr (N == 2) {
+        join_pairs<W>(words[0], words[1], texels[0], texels[1]);
+    } else {
+        Ints<W> even[2], odd[2];
+        join_pairs<W>(words[0], words[2], even[0], even[1]);
+        join_pairs<W>(words[1], words[3], odd[0], odd[1]);
+        join_pairs<W>(even[0], odd[0], texels[0], texels[1]);
+        join_pairs<W>(even[1], odd[1], texels[2], texels[3]);
+    }
+    alignas(64) std::byte packed[sizeof texels];
+    __builtin_memcpy(packed, texels, sizeof texels);
+    constexpr int run = W < 8 ? W : 8;
+    for (int first = 0; first < W; first += run) {
+        const std::uint32_t lanes = ((1u << run) - 1) << first;
+        const Ints<W> behind = offset - offset[first] - (lane_numbers<W>() - first) * (4 * N);
+        if ((stored & lanes) == lanes && (mask_bits<W>(behind == 0) & lanes) == lanes) {
+            __builtin_memcpy(base + offset[first], packed + first * 4 * N, run * 4 * N);
+            continue;
+        }
+        for (std::uint32_t rest = stored & lanes; rest != 0; rest &= rest - 1) {
+            const int lane = first_bit(rest);
+            __builtin_memcpy(base + offset[lane], packed + lane * 4 * N, 4 * N);
+        }
+    }
+}
+
 template <int W>
 [[gnu::noinline]] void store_texels(const Invocation& call) {
     Source source;
@@ -138,15 +171,14 @@ template <int W>
     if (stored == 0) return;
     Ints<W> values[4];
     for (int c = 0; c < 4; ++c) values[c] = call.ints<W>(call.arguments->texel[c]);
-    if (plan.codec == Codec::word && source.codec == Codec::word && stored == all_lanes<W> && !at.has_sample) {
-        const Place<W> place = place_texel<W>(source, at.x, at.y, at.slice);
-        const std::int32_t first = place.offset[0];
-        if (mask_bits<W>(place.offset - first == lane_numbers<W>() * 4) == all_lanes<W>) {
-            return store_lanes<W>(source.base + first, values[0]);
-        }
-    }
     Ints<W> words[4];
     if (plan.can_store) encode_words<W>(plan, values, words);
+    if (plan.can_store && source.uses_offsets() && !at.has_sample && plan.texel_bytes >= 4) {
+        const Ints<W> offset = place_texel<W>(source, at.x, at.y, at.slice).offset;
+        if (plan.words == 1) return write_texels<W, 1>(source.base, offset, words, stored);
+        if (plan.words == 2) return write_texels<W, 2>(source.base, offset, words, stored);
+        if (plan.words == 4) return write_texels<W, 4>(source.base, offset, words, stored);
+    }
     for (std::uint32_t rest = stored; rest != 0; rest &= rest - 1) {
         const int lane = first_bit(rest);
         std::byte* to = source.base + static_cast<std::uint64_t>(at.slice[lane]) * source.slice_stride +

@@ -170,19 +170,21 @@ NACRE_INLINE int raw_channels(const FormatPlan& plan) {
         return 4;
 }
 
-/// Channels that are `raw_scale` times too large.
+/// Words of a texel that `decode_raw` takes; 0: the codec has other ways to its texels.
+template <Codec C>
+inline constexpr int raw_words = C == Codec::word || C == Codec::rgba8 || C == Codec::srgb8 ? 1
+                                 : C == Codec::half4                                        ? 2
+                                 : C == Codec::float4                                       ? 4
+                                                                                            : 0;
+
+/// Channels of texels whose words are known, `raw_scale` times too large.
 template <int W, Codec C>
-NACRE_INLINE void load_raw(const Source& source, const Place<W>& place, Floats<W>* out) {
+NACRE_INLINE void decode_raw(const Ints<W>* words, Floats<W>* out) {
     if constexpr (C == Codec::word) {
-        out[0] = (Floats<W>)gather_words<W>(source.base, place.offset);
-    } else if constexpr (C == Codec::rgba8 || C == Codec::srgb8 || C == Codec::block_rgba8 || C == Codec::block_srgb8) {
-        Ints<W> word;
-        if constexpr (C == Codec::rgba8 || C == Codec::srgb8) {
-            word = gather_words<W>(source.base, place.offset);
-        } else {
-            load_block_words<W>(source, place, word);
-        }
-        if constexpr (C == Codec::srgb8 || C == Codec::block_srgb8) {
+        out[0] = (Floats<W>)words[0];
+    } else if constexpr (C == Codec::rgba8 || C == Codec::srgb8) {
+        const Ints<W> word = words[0];
+        if constexpr (C == Codec::srgb8) {
             const auto* table = reinterpret_cast<const std::byte*>(srgb_to_linear_table());
             for (int c = 0; c < 3; ++c) out[c] = srgb_channel<W>(table, word, 8 * c);
         } else {
@@ -191,12 +193,36 @@ NACRE_INLINE void load_raw(const Source& source, const Place<W>& place, Floats<W
         out[3] = to_floats<W>((Ints<W>)((Uints<W>)word >> 24));
     } else if constexpr (C == Codec::half4) {
         for (int pair = 0; pair < 2; ++pair) {
-            const Ints<W> word = gather_words<W>(source.base, place.offset + 4 * pair);
-            out[2 * pair] = halves_to_floats<W>(word & 0xffff);
-            out[2 * pair + 1] = halves_to_floats<W>((Ints<W>)((Uints<W>)word >> 16));
+            out[2 * pair] = halves_to_floats<W>(words[pair] & 0xffff);
+            out[2 * pair + 1] = halves_to_floats<W>((Ints<W>)((Uints<W>)words[pair] >> 16));
         }
-    } else if constexpr (C == Codec::float4) {
-        for (int c = 0; c < 4; ++c) out[c] = (Floats<W>)gather_words<W>(source.base, place.offset + 4 * c);
+    } else {
+        static_assert(C == Codec::float4);
+        for (int c = 0; c < 4; ++c) out[c] = (Floats<W>)words[c];
+    }
+}
+
+/// The words of a texel for `decode_raw`.
+template <int W, Codec C>
+NACRE_INLINE void load_words(const Source& source, Ints<W> offset, Ints<W>* words) {
+    if constexpr (raw_words<C> == 1) {
+        words[0] = gather_words<W>(source.base, offset);
+    } else {
+        for (int i = 0; i < raw_words<C>; i += 2) gather_pairs<W>(source.base + 4 * i, offset, words[i], words[i + 1]);
+    }
+}
+
+/// Channels that are `raw_scale` times too large.
+template <int W, Codec C>
+NACRE_INLINE void load_raw(const Source& source, const Place<W>& place, Floats<W>* out) {
+    if constexpr (raw_words<C> != 0) {
+        Ints<W> words[raw_words<C>];
+        load_words<W, C>(source, place.offset, words);
+        decode_raw<W, C>(words, out);
+    } else if constexpr (C == Codec::block_rgba8 || C == Codec::block_srgb8) {
+        Ints<W> word;
+        load_block_words<W>(source, place, word);
+        decode_raw<W, C == Codec::block_srgb8 ? Codec::srgb8 : Codec::rgba8>(&word, out);
     } else if constexpr (C == Codec::general) {
         const FormatPlan& plan = *source.plan;
         Ints<W> words[4];
@@ -213,6 +239,26 @@ NACRE_INLINE void load_raw(const Source& source, const Place<W>& place, Floats<W
         load_block_channels<W>(source, place, out);
     } else if constexpr (C == Codec::far) {
         load_far_texels<W>(source, place, out);
+    }
+}
+
+/// Two texels of each lane. Where the second lies behind the first in all lanes, as it mostly does in a footprint, both are
+/// read at once.
+template <int W, Codec C>
+NACRE_INLINE void load_two_raw(const Source& source, const Place<W>& first, const Place<W>& second, Floats<W> (&out)[2][4]) {
+    if constexpr (raw_words<C> == 1) {
+        Ints<W> words[2];
+        if (mask_bits<W>(second.offset == first.offset + 4) == all_lanes<W>) {
+            gather_pairs<W>(source.base, first.offset, words[0], words[1]);
+        } else {
+            words[0] = gather_words<W>(source.base, first.offset);
+            words[1] = gather_words<W>(source.base, second.offset);
+        }
+        decode_raw<W, C>(&words[0], out[0]);
+        decode_raw<W, C>(&words[1], out[1]);
+    } else {
+        load_raw<W, C>(source, first, out[0]);
+        load_raw<W, C>(source, second, out[1]);
     }
 }
 
@@ -235,7 +281,7 @@ NACRE_INLINE void finish_raw(const FormatPlan& plan, Floats<W>* channels) {
     const int count = raw_channels<C>(plan);
     for (int c = 0; c < count; ++c) {
         const float scale = raw_scale<C>(plan, c);
-        if (scale != 1.0f) channels[c] = channels[c] / scale;
+        if (scale != 1.0f) channels[c] = quotient<W>(channels[c], scale);
     }
     if constexpr (C == Codec::rgba8 || C == Codec::srgb8) {
         if (plan.red_is_third) {

@@ -30,8 +30,7 @@ NACRE_INLINE Ints<W> encode_channel(const ChannelPlan& channel, Ints<W> value) {
             const Floats<W> known = x == x ? x : splat<W>(0.0f);
             return scale_and_round<W>(clamp<W>(known, splat<W>(-1.0f), splat<W>(1.0f)), channel.bits - 1u);
         }
-        case ChannelCoding::half:
-            return floats_to_small<W>(x, 10, false) | (Ints<W>)(((Uints<W>)value >> 16) & 0x8000u);
+        case ChannelCoding::half: return floats_to_halves<W>(x);
         case ChannelCoding::small_float: {
             const Ints<W> code = floats_to_small<W>(x, channel.bits - 5, true);
             return x <= 0.0f ? splat<W>(0) : code;
@@ -42,6 +41,26 @@ NACRE_INLINE Ints<W> encode_channel(const ChannelPlan& channel, Ints<W> value) {
 
 template <int W>
 NACRE_INLINE void encode_words(const FormatPlan& plan, const Ints<W>* values, Ints<W>* words) {
+    // Layouts that matter most, without choices for each channel.
+    switch (plan.codec) {
+        case Codec::word: words[0] = values[0]; return;
+        case Codec::float4:
+            for (int c = 0; c < 4; ++c) words[c] = values[c];
+            return;
+        case Codec::half4:
+            for (int pair = 0; pair < 2; ++pair)
+                words[pair] = floats_to_halves<W>((Floats<W>)values[2 * pair]) |
+                              floats_to_halves<W>((Floats<W>)values[2 * pair + 1]) << 16;
+            return;
+        case Codec::rgba8: {
+            const Floats<W> zero = splat<W>(0.0f), one = splat<W>(1.0f);
+            const auto code = [&](int c) { return scale_and_round<W>(clamp<W>((Floats<W>)values[c], zero, one), 8); };
+            const Ints<W> red = code(0), blue = code(2);
+            words[0] = (plan.red_is_third ? blue : red) | code(1) << 8 | (plan.red_is_third ? red : blue) << 16 | code(3) << 24;
+            return;
+        }
+        default: break;
+    }
     for (int i = 0; i < plan.words; ++i) words[i] = splat<W>(0);
     for (int c = 0; c < plan.channel_count; ++c) {
         const ChannelPlan& channel = plan.channels[c];

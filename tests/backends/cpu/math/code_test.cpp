@@ -28,6 +28,12 @@ Code code_of(const Variant& variant, const std::vector<Kind>& inputs, const Emit
     return code;
 }
 
+Emit to_int(bool is_signed) {
+    return [=](Math& math, Values values) {
+        return std::vector<llvm::Value*>{math.float_to_int(values[0], 32, is_signed)};
+    };
+}
+
 TEST(Code, of_sixteen_lanes_is_short_and_calls_nothing) {
     const struct {
         const char* name;
@@ -54,6 +60,8 @@ TEST(Code, of_sixteen_lanes_is_short_and_calls_nothing) {
         {"float_to_half", call(&Math::float_to_half), {Kind::single}, 16},
         {"half_to_float", call(&Math::half_to_float), {Kind::int32}, 14},
         {"round", call(&Math::round), {Kind::single}, 4},
+        {"float_to_int", to_int(true), {Kind::single}, 9},
+        {"float_to_uint", to_int(false), {Kind::single}, 6},
         {"s_div", call(&Math::s_div), {Kind::int32, Kind::int32}, 21},
         {"u_mod", call(&Math::u_mod), {Kind::int32, Kind::int32}, 17},
         {"find_u_msb", call(&Math::find_u_msb), {Kind::int32}, 3},

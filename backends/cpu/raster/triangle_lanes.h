@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "backends/cpu/raster/simd.h"
+#include "backends/cpu/raster/tile_data.h"
+
+/// @file
+/// Set-up of sixteen triangles at once. Internal linkage, as in simd.h.
+///
+/// What is computed for one triangle is what Assembler (chunk.cpp) computes for it, bit for bit: the same steps in the same
+/// precision.
+
+namespace nacre::cpu::raster {
+namespace {
+
+using Doubles [[gnu::vector_size(64)]] = double;
+using Longs [[gnu::vector_size(64)]] = std::int64_t;
+using HalfFloats [[gnu::vector_size(32)]] = float;
+using HalfInts [[gnu::vector_size(32)]] = std::int32_t;
+
+NACRE_LANES_INLINE Doubles doubles_of(const float* from) {
+    HalfFloats values;
+    std::memcpy(&values, from, sizeof(values));
+    return __builtin_convertvector(values, Doubles);
+}
+NACRE_LANES_INLINE Doubles doubles_of(const std::int32_t* from) {
+    HalfInts values;
+    std::memcpy(&values, from, sizeof(values));
+    return __builtin_convertvector(values, Doubles);
+}
+NACRE_LANES_INLINE Doubles doubles(double value) { return value - Doubles{}; }
+NACRE_LANES_INLINE Doubles magnitude(Doubles a) { return (Doubles)((Longs)a & 0x7fffffffffffffff); }
+NACRE_LANES_INLINE Doubles larger(Doubles a, Doubles b) { return a < b ? b : a; }
+NACRE_LANES_INLINE std::uint32_t mask_of_eight(Longs truth) {
+    const HalfInts narrow = __builtin_convertvector(truth, HalfInts);
+    Ints all{};
+    std::memcpy(&all, &narrow, sizeof(narrow));
+    return mask_of(~not_negative(all)) & 0xff;
+}
+
+/// Sixteen vertices, value by value.
+struct CornerLanes {
+    alignas(64) std::int32_t x[16], y[16], codes[16], offset[16];
+    alignas(64) float window_x[16], window_y[16], window_z[16];
+
+    void gather(const TriangleSetup& work, const std::uint32_t* locals) {
+        for (int lane = 0; lane < 16; lane += 4) {
+            Int4 fixed[4];
+            Float4 window[4];
+            for (int i = 0; i < 4; ++i) {
+                const SetupVertex& vertex = work.vertices[locals[lane + i]];
+                fixed[i] = load4(&vertex);
+                window[i] = load4(reinterpret_cast<const float*>(work.screen + std::size_t{vertex.offset} * 16));
+            }
+            transpose(fixed[0], fixed[1], fixed[2], fixed[3]);
+            transpose(window[0], window[1], window[2], window[3]);
+            store4(x + lane, fixed[0]), store4(y + lane, fixed[1]);
+            store4(codes + lane, fixed[2]), store4(offset + lane, fixed[3]);
+            store4(window_x + lane, window[0]), store4(window_y + lane, window[1]);
+            store4(window_z + lane, window[2]);
+        }
+    }
+};
+
+/// Vulkan specification, "Depth Bias Computation".
+/// @param largest  depth of the vertices, by magnitude
+NACRE_LANES_INLINE Doubles depth_bias(const TriangleSetup& work, Doubles slope, Doubles largest) {
+    Doubles unit = doubles(work.bias_unit);
+    if (work.bias_unit == 0.0) {
+        // That of single precision: the value of the last bit of the largest depth, which is never a denormal double.
+        const Longs exponent = ((Longs)largest >> 52) - 1023;
+        const Longs bounded = exponent < -126 ? Longs{} - 126 : exponent;
+        unit = (Doubles)((bounded - 23 + 1023) << 52);
+        unit = largest > 0.0 ? unit : Doubles{};
+    }
+    Doubles result = slope * static_cast<double>(work.bias_slope) + unit * static_cast<double>(work.bias);
+    const auto limit = static_cast<double>(work.bias_clamp);
+    if (limit > 0.0) result = doubles(limit) < result ? doubles(limit) : result;
+    if (limit < 0.0) result = result < doubles(limit) ? doubles(limit) : result;
+    return result - result == 0.0 ? result : Doubles{};
+}
+
+inline void set_up_triangles(TriangleSetup& work) {
+    CornerLanes corners[3];
+    for (int i = 0; i < 3; ++i) corners[i].gather(work, work.locals[i]);
+    const CornerLanes &a = corners[0], &b = corners[1], &c = corners[2];
+
+    const auto has = [](const Ints& codes, std::uint32_t bits) {
+        return ~equal(codes & ints(static_cast<std::int32_t>(bits)), ints(0));
+    };
+    const Ints any = load(a.codes) | load(b.codes) | load(c.codes);
+    const Ints all = load(a.codes) & load(b.codes) & load(c.codes);
+    const Lanes outside =
+        has(any, not_finite) | has(all, outside_view | clip_distances_mask | cull_distances_mask);
+    const Lanes clipped = has(any, outside_near | outside_far | outside_guard | clip_distances_mask);
+
+    // Pixels with a center inside of the bounds.
+    const auto bounds = [](const std::int32_t* one, const std::int32_t* other, const std::int32_t* third,
+                           std::int32_t begin, std::int32_t end, Ints& low, Ints& high) {
+        const Ints first = load(one), second = load(other), last = load(third);
+        low = shift_right_signed<subpixel_bits>(minimum(minimum(first, second), last) + ints(subpixels / 2 - 1));
+        high = shift_right_signed<subpixel_bits>(maximum(maximum(first, second), last) - ints(subpixels / 2));
+        low = maximum(low, ints(begin)), high = minimum(high, ints(end - 1));
+    };
+    Ints low_x, high_x, low_y, high_y;
+    bounds(a.x, b.x, c.x, work.x_begin, work.x_end, low_x, high_x);
+    bounds(a.y, b.y, c.y, work.y_begin, work.y_end, low_y, high_y);
+    const std::uint32_t nowhere = mask_of(less(high_x, low_x) | less(high_y, low_y));
+
+    alignas(64) float slope_x[16], slope_y[16], depth[16];
+    std::uint32_t clockwise = 0, flat = 0, thin = 0;
+    for (int half = 0; half < 16; half += 8) {
+        // Differences of coordinates have 24 bits, so that doubles hold the products.
+        const Doubles fixed_x = doubles_of(a.x + half), fixed_y = doubles_of(a.y + half);
+        const Doubles fixed_area =
+            (doubles_of(b.x + half) - fixed_x) * (doubles_of(c.y + half) - fixed_y) -
+            (doubles_of(c.x + half) - fixed_x) * (doubles_of(b.y + half) - fixed_y);
+        const Doubles x0 = doubles_of(a.window_x + half), y0 = doubles_of(a.window_y + half);
+        const Doubles z0 = doubles_of(a.window_z + half);
+        const Doubles x1 = doubles_of(b.window_x + half) - x0, y1 = doubles_of(b.window_y + half) - y0;
+        const Doubles x2 = doubles_of(c.window_x + half) - x0, y2 = doubles_of(c.window_y + half) - y0;
+        const Doubles z1 = doubles_of(b.window_z + half) - z0, z2 = doubles_of(c.window_z + half) - z0;
+        const Doubles area = x1 * y2 - x2 * y1;
+        clockwise |= mask_of_eight(fixed_area > 0.0) << half;
+        flat |= mask_of_eight(fixed_area == 0.0) << half;
+        thin |= (mask_of_eight(magnitude(area) < thin_area) | (mask_of_eight(area > 0.0) ^ (clockwise >> half & 0xff)))
+                << half;
+        const Doubles scale = 1.0 / area;
+        const Doubles dx = z1 * (y2 * scale) + z2 * (-y1 * scale), dy = z1 * (-x2 * scale) + z2 * (x1 * scale);
+        Doubles base = z0;
+        if (work.bias != 0.0f || work.bias_slope != 0.0f) {
+            const Doubles largest = larger(
+                larger(magnitude(z0), magnitude(doubles_of(b.window_z + half))), magnitude(doubles_of(c.window_z + half)));
+            base = base + depth_bias(work, larger(magnitude(dx), magnitude(dy)), largest);
+        }
+        const auto put = [&](float* to, Doubles value) {
+            const Doubles bounded = magnitude(value) < steepest_slope ? value : Doubles{};
+            const HalfFloats rounded = __builtin_convertvector(bounded, HalfFloats);
+            std::memcpy(to + half, &rounded, sizeof(rounded));
+        };
+        put(slope_x, dx), put(slope_y, dy), put(depth, base);
+    }
+    const std::uint32_t asked = (work.count == 16 ? 0xffffu : (1u << work.count) - 1) & ~mask_of(outside);
+    const std::uint32_t front = work.front_is_clockwise ? clockwise : ~clockwise;
+    const std::uint32_t culled =
+        flat | (work.cull == rhi::CullMode::front ? front : work.cull == rhi::CullMode::back ? ~front : 0);
+    const std::uint32_t special = asked & mask_of(clipped);
+    const std::uint32_t drawn = asked & ~special & ~culled & ~nowhere;
+    work.special = special | (drawn & thin);
+    work.drawn = drawn & ~thin;
+    if (work.drawn == 0) return;
+
+    store(work.left, shift_right_signed<tile_bits>(low_x)), store(work.right, shift_right_signed<tile_bits>(high_x));
+    store(work.top, shift_right_signed<tile_bits>(low_y)), store(work.bottom, shift_right_signed<tile_bits>(high_y));
+    const Lanes keeps = lanes_of(clockwise);
+    const Ints x1 = select(keeps, load(b.x), load(c.x)), x2 = select(keeps, load(c.x), load(b.x));
+    const Ints y1 = select(keeps, load(b.y), load(c.y)), y2 = select(keeps, load(c.y), load(b.y));
+    alignas(64) std::int32_t swapped[4][16], bits[16], numbers[16];
+    store(swapped[0], x1), store(swapped[1], x2), store(swapped[2], y1), store(swapped[3], y2);
+    store(bits, select(lanes_of(front), ints(Record::front_facing), ints(0)) |
+                    select(keeps, ints(0), ints(Record::swapped)) |
+                    ints(static_cast<std::int32_t>(work.draw_bits)));
+    store(numbers, ints(static_cast<std::int32_t>(work.first_primitive)) + load(lane_numbers));
+    // Rows of four words of a Record, in its order.
+    const auto word = [](const float* from) { return reinterpret_cast<const std::int32_t*>(from); };
+    const std::int32_t* const words[16] = {a.x,        swapped[0],    swapped[1],    a.y,
+                                           swapped[2], swapped[3],    a.offset,      b.offset,
+                                           c.offset,   numbers,       bits,          word(depth),
+                                           word(slope_x), word(slope_y), word(a.window_x), word(a.window_y)};
+    static_assert(offsetof(Record, y) == 12 && offsetof(Record, vertex) == 24 && offsetof(Record, primitive_id) == 36 &&
+                  offsetof(Record, bits) == 40 && offsetof(Record, depth_c) == 44 && offsetof(Record, x0) == 56);
+    for (int lane = 0; lane < 16; lane += 4)
+        for (int row = 0; row < 4; ++row) {
+            Int4 lines[4];
+            for (int i = 0; i < 4; ++i) lines[i] = load4(words[4 * row + i] + lane);
+            transpose(lines[0], lines[1], lines[2], lines[3]);
+            for (int i = 0; i < 4; ++i)
+                store4(reinterpret_cast<std::byte*>(work.records + lane + i) + 16 * row, lines[i]);
+        }
+}
+
+}  // namespace
+}  // namespace nacre::cpu::raster
