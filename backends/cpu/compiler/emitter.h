@@ -385,9 +385,7 @@ class Emitter {
             std::uint32_t block = 0;
             std::uint64_t chain = 0;
             std::vector<llvm::AllocaInst*> slots, outside_slots;
-<<<<<<< HEAD
             std::vector<llvm::AllocaInst*> undefined_slots;  ///< Null where nothing is undefined.
-=======
             std::vector<llvm::AllocaInst*> linear_slots;  ///< Of `linear_base`, where there is one; empty: nowhere.
         };
         std::unordered_map<Id, Definition> definitions;
