@@ -4,6 +4,7 @@
 //     cpu_clean_test                                   10 shaders with fixed seeds
 //     cpu_clean_test --seed=1000 --count=10000
 #include <cstdlib>
+#include <iostream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -38,6 +39,8 @@ TEST(CpuClean, RandomShadersGiveNoReport) {
             const std::vector<std::string> messages = (*checked)->take_messages();
             for (const std::string& message : messages) ADD_FAILURE() << message;
             reported += !messages.empty();
+            if (const std::uint64_t done = seed - settings.seed + 1; done % 100 == 0)
+                std::cout << done << " shaders on " << spec << ", reports on " << reported << std::endl;
         }
         EXPECT_EQ(reported, 0u) << "of " << settings.count << " shaders on " << spec;
     }

@@ -101,7 +101,7 @@ Expected<void> FaultBench::compute(const std::string& path, const std::string& t
     const rhi::ComputePipeline pipeline = make_compute(path, text);
     rhi::CommandList list = device_->create_command_list("once");
     list.set_pipeline(pipeline);
-    list.set_bind_group(0, bind(pipeline));
+    if (text.find("set = 0") != std::string::npos) list.set_bind_group(0, bind(pipeline));
     list.dispatch({.x = groups});
     return submit(std::move(list));
 }
