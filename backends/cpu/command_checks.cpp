@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstring>
 #include <functional>
-
-#include <fmt/format.h>
 
 #include "backends/cpu/commands.h"
 #include "rhi/state_tracker.h"
@@ -131,14 +131,16 @@ void Executor::begin_statement(const rhi::CommandHeader& header, const std::byte
     const FlatPlan::ListNames& list = plan_->lists.at(list_ - 1);
     const std::string name = list.strings.at(reinterpret_cast<const rhi::BeginStatementCommand*>(payload)->name);
     for (const FlatPlan::Unstated& use : plan_->unstated) {
-        CheckedMemory* memory = use.buffer ? use.buffer->checked.get() : use.texture ? use.texture->checked.get() : nullptr;
+        CheckedMemory* memory = use.buffer    ? use.buffer->checked.get()
+                                : use.texture ? use.texture->checked.get()
+                                              : nullptr;
         if (use.statement != at || !memory || !(checks_.flags & check_hostile)) continue;
         checks_.log->add(rhi::ShaderFault::unstated_access, nullptr, name + memory->name(), 1, false, [&] {
             FoundFault fault;
             fault.attempted = "run pass";
             fault.subject = fmt::format("'{}' of list '{}', {}", name, list.name, memory->name());
-            fault.reason = fmt::format("expected uses that its statement names ({}), found {}", rhi::text_of(use.stated),
-                                       rhi::text_of(use.found & ~use.stated));
+            fault.reason = fmt::format("expected uses that its statement names ({}), found {}",
+                                       rhi::text_of(use.stated), rhi::text_of(use.found & ~use.stated));
             return fault;
         });
         Withheld& withheld = withheld_.emplace_back();
@@ -186,7 +188,8 @@ void Executor::note_transfer(const rhi::CommandHeader& header, const std::byte* 
         case CommandType::copy_buffer: {
             const auto& command = NACRE_COMMAND(CopyBufferCommand);
             CheckedMemory *from = checked_buffer(command.source), *to = checked_buffer(command.destination);
-            if (from && to) to->copy_definedness(command.destination_offset, *from, command.source_offset, command.size);
+            if (from && to)
+                to->copy_definedness(command.destination_offset, *from, command.source_offset, command.size);
             return;
         }
         case CommandType::fill_buffer: {
@@ -231,12 +234,14 @@ void Executor::note_transfer(const rhi::CommandHeader& header, const std::byte* 
             const rhi::TextureCopy& region = command.region;
             if (!from.checked || !to.checked) return;
             const std::uint32_t edge = rhi::info(from.desc.format).block_width;
-            const auto copy_plane = [&](const ImageLevel& source, const ImageLevel& destination, std::uint32_t texel_bytes) {
+            const auto copy_plane = [&](const ImageLevel& source, const ImageLevel& destination,
+                                        std::uint32_t texel_bytes) {
                 if (!source.data || !destination.data) return;
                 const std::uint64_t row_bytes = std::uint64_t{(region.extent.width + edge - 1) / edge} * texel_bytes;
                 const auto place = [&](const ImageLevel& level, std::uint32_t first_layer, const rhi::Offset3D& offset,
                                        std::uint32_t layer, std::uint32_t slice, std::uint32_t row) {
-                    return level.data + (first_layer + layer) * level.layer_stride + (offset.z + slice) * level.slice_stride +
+                    return level.data + (first_layer + layer) * level.layer_stride +
+                           (offset.z + slice) * level.slice_stride +
                            std::uint64_t{offset.y / edge + row} * level.row_stride +
                            std::uint64_t{offset.x / edge} * texel_bytes;
                 };
@@ -245,13 +250,14 @@ void Executor::note_transfer(const rhi::CommandHeader& header, const std::byte* 
                         for (std::uint32_t row = 0; row < (region.extent.height + edge - 1) / edge; ++row) {
                             const auto at = from.checked->offset_of(
                                 place(source, region.source_layer, region.source_offset, layer, slice, row));
-                            const auto into = to.checked->offset_of(
-                                place(destination, region.destination_layer, region.destination_offset, layer, slice, row));
+                            const auto into = to.checked->offset_of(place(
+                                destination, region.destination_layer, region.destination_offset, layer, slice, row));
                             if (at && into) to.checked->copy_definedness(*into, *from.checked, *at, row_bytes);
                         }
             };
             const ImageView &source = from.whole(), &destination = to.whole();
-            copy_plane(source.levels[region.source_mip], destination.levels[region.destination_mip], source.texel_bytes);
+            copy_plane(source.levels[region.source_mip], destination.levels[region.destination_mip],
+                       source.texel_bytes);
             copy_plane(source.stencil_levels[region.source_mip], destination.stencil_levels[region.destination_mip], 1);
             return;
         }

@@ -36,7 +36,8 @@ std::string invocation_text(const RunningInvocations& running, std::uint32_t lan
         }
         case rhi::ShaderStage::vertex: {
             const auto& batch = *static_cast<const VertexBatch*>(running.work);
-            return fmt::format("vertex {} of instance {}", static_cast<std::int32_t>(batch.indices[lane]), batch.instance);
+            return fmt::format("vertex {} of instance {}", static_cast<std::int32_t>(batch.indices[lane]),
+                               batch.instance);
         }
         default: {
             const auto& batch = *static_cast<const FragmentBatch*>(running.work);
@@ -68,16 +69,15 @@ void add_fault(const RunningInvocations& running, const CheckSite& site, ShaderF
         object += fmt::format(" {}", static_cast<const void*>(std::max(key, other)));
         key = std::min(key, other);
     }
-    checks.log->add(kind, key, object,
-                    static_cast<std::uint32_t>(std::popcount(lanes)), stops, [&] {
-                        const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
-                        FoundFault fault;
-                        fault.subject = fmt::format("'{}'", or_empty(site.shader));
-                        if (site.place) fault.subject += fmt::format(" ({})", site.place);
-                        fault.subject += fmt::format(", {}, {}", checks.command, invocation_text(running, lane));
-                        fault.reason = reason(lane);
-                        return fault;
-                    });
+    checks.log->add(kind, key, object, static_cast<std::uint32_t>(std::popcount(lanes)), stops, [&] {
+        const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
+        FoundFault fault;
+        fault.subject = fmt::format("'{}'", or_empty(site.shader));
+        if (site.place) fault.subject += fmt::format(" ({})", site.place);
+        fault.subject += fmt::format(", {}, {}", checks.command, invocation_text(running, lane));
+        fault.reason = reason(lane);
+        return fault;
+    });
     if (stops) std::atomic_ref(checks.state->expired).store(1, std::memory_order_relaxed);
 }
 
@@ -127,13 +127,13 @@ void fault(const RunningInvocations* running, const CheckSite* site, std::uint32
                                    object.empty() ? "an array" : object, found ? found[lane] : 0);
             case uninitialized_read:
                 if (running->undefined_site && running->undefined_lanes >> lane & 1)
-                    return fmt::format("expected a value that was written, found one that depends on what was not: {}, read at {}",
-                                       object_text(*running->undefined_site, running->undefined_memory),
-                                       running->undefined_site->place ? running->undefined_site->place : "an unknown line");
+                    return fmt::format(
+                        "expected a value that was written, found one that depends on what was not: {}, read at {}",
+                        object_text(*running->undefined_site, running->undefined_memory),
+                        running->undefined_site->place ? running->undefined_site->place : "an unknown line");
                 return fmt::format("expected a value that was written, found one that depends on what was not{}{}",
                                    object.empty() ? "" : ": ", object);
-            case nonuniform_derivative:
-                return "expected all pixels of a quad to run here, found some that do not";
+            case nonuniform_derivative: return "expected all pixels of a quad to run here, found some that do not";
             default: return "";
         }
     });
@@ -161,19 +161,23 @@ void note_race(const RunningInvocations& running, const CheckSite& site, const A
         const std::uint32_t first = place % 4, count = std::min(4 - first, bytes - done);
         use.bytes = static_cast<std::uint8_t>(((1u << count) - 1) << first);
         if (const auto other = at.memory->note_use(place, (access & access_write) != 0, use)) {
-            add_fault(running, site, ShaderFault::data_race, 1u << lane, at.memory, [&](std::uint32_t) {
-                const std::string object = object_text(site, at.memory);
-                return fmt::format("expected one invocation to use byte {} of {} at a time, found another at {}", at.offset,
-                                   object.empty() ? "the workgroup's memory" : object,
-                                   other->site && other->site->place ? other->site->place : "an unknown line");
-            }, other->site);
+            add_fault(
+                running, site, ShaderFault::data_race, 1u << lane, at.memory,
+                [&](std::uint32_t) {
+                    const std::string object = object_text(site, at.memory);
+                    return fmt::format("expected one invocation to use byte {} of {} at a time, found another at {}",
+                                       at.offset, object.empty() ? "the workgroup's memory" : object,
+                                       other->site && other->site->place ? other->site->place : "an unknown line");
+                },
+                other->site);
             return;
         }
         done += count;
     }
 }
 
-void note_undefined(RunningInvocations& running, const CheckSite& site, const CheckedMemory* memory, std::uint32_t lanes) {
+void note_undefined(RunningInvocations& running, const CheckSite& site, const CheckedMemory* memory,
+                    std::uint32_t lanes) {
     if (lanes == 0) return;
     running.undefined_site = &site;
     running.undefined_memory = memory;
@@ -221,7 +225,8 @@ TexelPlace find_texel(const ImageView& view, const ImageArguments& arguments, st
     const auto check = [&](const char* axis, std::uint32_t found, std::uint32_t limit) {
         if (found >= limit && !place.axis) place.axis = axis, place.found = found, place.limit = limit;
     };
-    if (operation == ImageOperation::fetch && view.samples == 1) mip = std::bit_cast<std::uint32_t>(arguments.lod[lane]);
+    if (operation == ImageOperation::fetch && view.samples == 1)
+        mip = std::bit_cast<std::uint32_t>(arguments.lod[lane]);
     check("mip", mip, view.mip_count);
     if (place.axis) return place;
     const ImageLevel& level = view.levels[mip];
@@ -242,8 +247,7 @@ TexelPlace find_texel(const ImageView& view, const ImageArguments& arguments, st
         check("layer", slice = arguments.coordinates[view.dimension == d1_array ? 1 : 2][lane], view.layer_count);
         slice_stride = level.layer_stride;
     }
-    if (view.samples > 1)
-        check("sample", sample = static_cast<std::uint32_t>(arguments.sample[lane]), view.samples);
+    if (view.samples > 1) check("sample", sample = static_cast<std::uint32_t>(arguments.sample[lane]), view.samples);
     if (place.axis) return place;
     const std::uint32_t edge = rhi::info(view.format).block_width;
     place.address = level.data + slice * slice_stride + sample * level.sample_stride +
@@ -253,7 +257,8 @@ TexelPlace find_texel(const ImageView& view, const ImageArguments& arguments, st
 
 /// Lanes of a filtered read in which an undefined texel has a share.
 std::uint32_t sample_undefined(const ImageView& view, CheckedMemory& memory, const Descriptor& sampler,
-                               ImageArguments& arguments, std::uint32_t flags, std::uint32_t lanes, std::uint32_t lane_count) {
+                               ImageArguments& arguments, std::uint32_t flags, std::uint32_t lanes,
+                               std::uint32_t lane_count) {
     if (!sampler.sampler || view.samples > 1) return 0;
     const auto texels = memory.undefined_texels(view);
     if (!texels) return 0;
@@ -265,7 +270,8 @@ std::uint32_t sample_undefined(const ImageView& view, CheckedMemory& memory, con
     std::uint32_t undefined = 0;
     for (std::uint32_t component = 0; component < 4; ++component) {
         // Gathers give four texels; else the others are 0, and alpha is 1.
-        if (component != 0 && static_cast<ImageOperation>(flags & image_operation_mask) != ImageOperation::gather) break;
+        if (component != 0 && static_cast<ImageOperation>(flags & image_operation_mask) != ImageOperation::gather)
+            break;
         for (std::uint32_t lane = 0; lane < lane_count; ++lane)
             if (std::bit_cast<float>(arguments.result[component][lane]) > 0.0f) undefined |= 1u << lane;
     }
@@ -309,8 +315,7 @@ std::uint32_t image(RunningInvocations* running, const CheckSite* site, const De
         const Accessed at{known, *offset};
         if ((access & access_read) && known->is_undefined(at.offset, view->texel_bytes)) read_undefined |= 1u << lane;
         // A texel is used whole: its first word stands for it.
-        if (access & access_shared)
-            note_race(*running, *site, at, std::min(view->texel_bytes, 4u), access, lane);
+        if (access & access_shared) note_race(*running, *site, at, std::min(view->texel_bytes, 4u), access, lane);
         if (access & access_write) known->define(at.offset, view->texel_bytes);
     }
     note_undefined(*running, *site, known, read_undefined);

@@ -15,9 +15,9 @@ namespace nacre::cpu {
 /// What checked code is told of the dispatch or draw that it runs in. Read by all threads.
 class CommandChecks {
   public:
-    std::uint32_t flags = 0;           ///< CheckFlags
-    std::uint32_t scope = 0;           ///< Of races: dispatches and render pass have numbers of their own, from 1.
-    std::string command;               ///< "dispatch 2 of list 'frame', pass 'lighting'"
+    std::uint32_t flags = 0;  ///< CheckFlags
+    std::uint32_t scope = 0;  ///< Of races: dispatches and render pass have numbers of their own, from 1.
+    std::string command;      ///< "dispatch 2 of list 'frame', pass 'lighting'"
     std::array<const CheckedObjects*, max_groups> objects{};
     std::span<CheckedMemory* const> workgroup_memories;  ///< One for each thread; null entries are allowed.
     std::atomic<std::uint64_t>* batches = nullptr;       ///< Counts the batches of a scope.

@@ -166,8 +166,8 @@ std::optional<WordUse> CheckedMemory::note_use(std::uint64_t offset, bool writes
         word.write = use;
         return other;
     }
-    // The first reader of a scope is kept, so that a write behind several reads finds one that is not its own; readers of
-    // other times are of no more use.
+    // The first reader of a scope is kept, so that a write behind several reads finds one that is not its own; readers
+    // of other times are of no more use.
     const WordUse& first = word.first_read;
     const bool is_over = first.scope != use.scope || (first.batch != use.batch && use.is_private) ||
                          (first.batch == use.batch && first.barriers != use.barriers);

@@ -14,25 +14,25 @@
 #include "backends/cpu/checks/check_interface.h"
 
 /// @file
-/// What is known of the memory of a buffer, a texture or a workgroup besides its content: which bytes were ever written, and
-/// who used which word last.
+/// What is known of the memory of a buffer, a texture or a workgroup besides its content: which bytes were ever
+/// written, and who used which word last.
 
 namespace nacre::cpu {
 
 /// Who used a word: an invocation, at one place of its shader.
 struct WordUse {
-    std::uint64_t batch = 0;     ///< Workgroup or batch.
+    std::uint64_t batch = 0;  ///< Workgroup or batch.
     const CheckSite* site = nullptr;
     std::uint32_t scope = 0;     ///< Dispatch or render pass; 0: nobody.
     std::uint16_t lane = 0;      ///< Within the batch.
     std::uint16_t barriers = 0;  ///< Workgroup barriers that it had passed.
     std::uint8_t bytes = 0;      ///< One bit for each byte of the word.
     bool is_atomic = false;
-    bool is_private = false;     ///< Each batch has content of its own, one after another: a workgroup's memory.
+    bool is_private = false;  ///< Each batch has content of its own, one after another: a workgroup's memory.
 };
 
-/// A view's texels as numbers: 1 where any byte is undefined, else 0. What sampling makes of them tells whether an undefined
-/// texel has a share in the result.
+/// A view's texels as numbers: 1 where any byte is undefined, else 0. What sampling makes of them tells whether an
+/// undefined texel has a share in the result.
 struct UndefinedTexels {
     ImageView view;
     std::vector<float> numbers;
@@ -61,7 +61,8 @@ class CheckedMemory {
     /// Whether any byte may be undefined; cheap.
     [[nodiscard]] bool has_undefined() const { return has_undefined_.load(std::memory_order_relaxed); }
     /// Takes over from other memory what is defined there.
-    void copy_definedness(std::uint64_t offset, const CheckedMemory& from, std::uint64_t from_offset, std::uint64_t bytes);
+    void copy_definedness(std::uint64_t offset, const CheckedMemory& from, std::uint64_t from_offset,
+                          std::uint64_t bytes);
 
     /// Of a view of this texture, as of now; null where nothing of it is undefined.
     [[nodiscard]] std::shared_ptr<const UndefinedTexels> undefined_texels(const ImageView& view);
@@ -86,7 +87,7 @@ class CheckedMemory {
     std::byte* const data_;
     const std::uint64_t size_;
     std::atomic<bool> has_undefined_;
-    std::vector<std::uint64_t> undefined_;  ///< One bit for each byte.
+    std::vector<std::uint64_t> undefined_;   ///< One bit for each byte.
     std::atomic<std::uint64_t> version_{1};  ///< Rises with every change of `undefined_`.
     std::mutex texels_mutex_;
     std::map<const ImageView*, std::shared_ptr<const UndefinedTexels>> texels_;

@@ -17,7 +17,8 @@ const char* remedy_of(rhi::ShaderFault kind) {
         case index_range: return "Compare the index with the number of elements before.";
         case uninitialized_read: return "Write it before it is read.";
         case data_race: return "Use an atomic operation, a barrier, or a place for each invocation.";
-        case nonuniform_derivative: return "Take derivatives, and sample with an implicit level of detail, where all pixels go.";
+        case nonuniform_derivative:
+            return "Take derivatives, and sample with an implicit level of detail, where all pixels go.";
         case host_access: return "Wait for the work before, or use another buffer.";
         case unstated_access: return "Add the use to the statement of the pass.";
     }
@@ -26,8 +27,8 @@ const char* remedy_of(rhi::ShaderFault kind) {
 
 }  // namespace
 
-void FaultLog::add(rhi::ShaderFault kind, const void* key, const std::string& object, std::uint32_t count,
-                   bool stops, const std::function<FoundFault()>& describe) {
+void FaultLog::add(rhi::ShaderFault kind, const void* key, const std::string& object, std::uint32_t count, bool stops,
+                   const std::function<FoundFault()>& describe) {
     const std::scoped_lock lock(mutex_);
     // Whatever follows may be its consequence.
     if (stop_ != ~std::size_t{0} && !known_.contains({kind, key, object})) return;

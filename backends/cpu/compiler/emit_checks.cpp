@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Code that looks for faults while a shader runs: what it finds goes to the functions of checks/check_interface.h.
-#include <algorithm>
-#include <array>
-#include <deque>
-
 #include <fmt/format.h>
 #include <llvm/IR/Constants.h>
 #include <llvm/IR/GlobalVariable.h>
 #include <llvm/IR/MDBuilder.h>
+
+#include <algorithm>
+#include <array>
+#include <deque>
 
 #include "backends/cpu/compiler/emitter.h"
 #include "backends/cpu/compiler/source_names.h"
@@ -26,7 +26,8 @@ struct Emitter::CheckNotes {
     std::unordered_map<Id, std::uint32_t> last_store;  ///< Offset of the last store to a variable.
     std::unordered_map<std::string, llvm::Constant*> sites;
     std::unordered_map<const Function*, std::unordered_map<Id, const Instruction*>> definitions;
-    llvm::AllocaInst *running = nullptr, *found = nullptr, *limit = nullptr, *descriptors = nullptr, *addresses = nullptr;
+    llvm::AllocaInst *running = nullptr, *found = nullptr, *limit = nullptr, *descriptors = nullptr,
+                     *addresses = nullptr;
 };
 
 Emitter::CheckNotes& Emitter::notes() {
@@ -83,7 +84,8 @@ std::string Emitter::origin_of(Id value) const {
         const Id id = waiting.front();
         waiting.pop_front();
         if (const Variable* variable = module.variable(id)) {
-            if (const std::string name = name_of(id); !name.empty() && variable->storage != StorageClass::Input) return name;
+            if (const std::string name = name_of(id); !name.empty() && variable->storage != StorageClass::Input)
+                return name;
             continue;
         }
         const auto found = definitions.find(id);
@@ -100,12 +102,15 @@ llvm::Value* Emitter::check_site(const std::string& object, std::int32_t set, st
     const auto text = [&](const std::string& words) -> llvm::Constant* {
         if (words.empty()) return llvm::ConstantPointerNull::get(pointer_type);
         llvm::Constant* bytes = llvm::ConstantDataArray::getString(context, words);
-        return new llvm::GlobalVariable(target, bytes->getType(), true, llvm::GlobalValue::InternalLinkage, bytes, "text");
+        return new llvm::GlobalVariable(target, bytes->getType(), true, llvm::GlobalValue::InternalLinkage, bytes,
+                                        "text");
     };
-    auto* type = llvm::StructType::get(context, {pointer_type, pointer_type, pointer_type, builder.getInt32Ty(), builder.getInt32Ty()});
-    static_assert(offsetof(CheckSite, place) == 8 && offsetof(CheckSite, object) == 16 && offsetof(CheckSite, set) == 24 &&
-                  offsetof(CheckSite, binding) == 28);
-    llvm::Constant* content = llvm::ConstantStruct::get(type, {text(module.name), text(place), text(object), int32(set), int32(binding)});
+    auto* type = llvm::StructType::get(
+        context, {pointer_type, pointer_type, pointer_type, builder.getInt32Ty(), builder.getInt32Ty()});
+    static_assert(offsetof(CheckSite, place) == 8 && offsetof(CheckSite, object) == 16 &&
+                  offsetof(CheckSite, set) == 24 && offsetof(CheckSite, binding) == 28);
+    llvm::Constant* content =
+        llvm::ConstantStruct::get(type, {text(module.name), text(place), text(object), int32(set), int32(binding)});
     site = new llvm::GlobalVariable(target, type, true, llvm::GlobalValue::InternalLinkage, content, "site");
     return site;
 }
@@ -126,7 +131,8 @@ void Emitter::begin_checks(rhi::ShaderStage stage, llvm::Value* work, llvm::Valu
     put(offsetof(RunningInvocations, lanes), int32(lanes));
     put(offsetof(RunningInvocations, group_x), group_x ? group_x : int32(0));
     put(offsetof(RunningInvocations, subgroup), subgroup ? subgroup : int32(0));
-    for (std::size_t i = 0; i < 3; ++i) put(offsetof(RunningInvocations, size) + i * 4, int32(module.workgroup_size[i]));
+    for (std::size_t i = 0; i < 3; ++i)
+        put(offsetof(RunningInvocations, size) + i * 4, int32(module.workgroup_size[i]));
     put(offsetof(RunningInvocations, barriers), int32(0));
     put(offsetof(RunningInvocations, undefined_site), llvm::ConstantPointerNull::get(pointer_type));
     if (stage != rhi::ShaderStage::compute) {
@@ -140,7 +146,8 @@ void Emitter::begin_checks(rhi::ShaderStage stage, llvm::Value* work, llvm::Valu
         builder.CreateMul(range_word(offsetof(WorkgroupRange, z)), range_word(offsetof(WorkgroupRange, count) + 4)),
         range_word(offsetof(WorkgroupRange, y)));
     put(offsetof(RunningInvocations, batch),
-        builder.CreateAdd(builder.CreateMul(row, range_word(offsetof(WorkgroupRange, count))), builder.CreateZExt(group_x, wide)));
+        builder.CreateAdd(builder.CreateMul(row, range_word(offsetof(WorkgroupRange, count))),
+                          builder.CreateZExt(group_x, wide)));
 }
 
 void Emitter::check_workgroup(llvm::Value* kernel_context, llvm::Value* memory) {
@@ -148,8 +155,9 @@ void Emitter::check_workgroup(llvm::Value* kernel_context, llvm::Value* memory) 
     for (const auto& [id, variable] : module.variables())
         if (variable.storage == StorageClass::Workgroup) bytes += (module.tight_size(variable.type) + 15) / 16 * 16;
     if (bytes == 0) return;
-    builder.CreateCall(external("nacre_cpu_check_workgroup", builder.getVoidTy(), {pointer_type, pointer_type, builder.getInt64Ty()}),
-                       {kernel_context, memory, int64(static_cast<std::int64_t>(bytes))});
+    builder.CreateCall(
+        external("nacre_cpu_check_workgroup", builder.getVoidTy(), {pointer_type, pointer_type, builder.getInt64Ty()}),
+        {kernel_context, memory, int64(static_cast<std::int64_t>(bytes))});
 }
 
 void Emitter::check_barrier() {
@@ -159,14 +167,15 @@ void Emitter::check_barrier() {
 
 // ---- Faults -----------------------------------------------------------------------------------------------------
 
-void Emitter::check_fault(ShaderFault kind, llvm::Value* bad, const std::string& object, const Component& found, const Component& limit,
-                          const Pointer* pointer) {
+void Emitter::check_fault(ShaderFault kind, llvm::Value* bad, const std::string& object, const Component& found,
+                          const Component& limit, const Pointer* pointer) {
     if (const auto* never = llvm::dyn_cast<llvm::Constant>(bad); never && never->isNullValue()) return;
     CheckNotes& all = notes();
     llvm::Value* bits = mask_bits(both(effect_mask(), bad));
     llvm::BasicBlock* report = llvm::BasicBlock::Create(context, "fault", function_);
     llvm::BasicBlock* after = llvm::BasicBlock::Create(context, "no_fault", function_);
-    builder.CreateCondBr(builder.CreateICmpNE(bits, int32(0)), report, after, llvm::MDBuilder(context).createBranchWeights(1, 1 << 20));
+    builder.CreateCondBr(builder.CreateICmpNE(bits, int32(0)), report, after,
+                         llvm::MDBuilder(context).createBranchWeights(1, 1 << 20));
     builder.SetInsertPoint(report);
     const auto put = [&](const Component& value, llvm::AllocaInst*& slot) -> llvm::Value* {
         if (!value) return llvm::ConstantPointerNull::get(pointer_type);
@@ -184,9 +193,10 @@ void Emitter::check_fault(ShaderFault kind, llvm::Value* bad, const std::string&
         if (pointer->descriptor_address.is_uniform()) descriptor_at = pointer->descriptor_address.value;
     }
     builder.CreateCall(external("nacre_cpu_check_fault", builder.getVoidTy(),
-                                {pointer_type, pointer_type, builder.getInt32Ty(), builder.getInt32Ty(), pointer_type, pointer_type, pointer_type}),
-                       {all.running, check_site(object, set, binding), int32(static_cast<std::int32_t>(kind)), bits, descriptor_at, found_values,
-                        limit_values});
+                                {pointer_type, pointer_type, builder.getInt32Ty(), builder.getInt32Ty(), pointer_type,
+                                 pointer_type, pointer_type}),
+                       {all.running, check_site(object, set, binding), int32(static_cast<std::int32_t>(kind)), bits,
+                        descriptor_at, found_values, limit_values});
     builder.CreateBr(after);
     builder.SetInsertPoint(after);
 }
@@ -207,18 +217,40 @@ void Emitter::check_operands(const Instruction& at) {
             }
             case Op::OpImageWrite: look(at.operand(2)); [[fallthrough]];
             case Op::OpImageTexelPointer:
-            case Op::OpImageSampleImplicitLod: case Op::OpImageSampleExplicitLod: case Op::OpImageSampleDrefImplicitLod:
-            case Op::OpImageSampleDrefExplicitLod: case Op::OpImageSampleProjImplicitLod: case Op::OpImageSampleProjExplicitLod:
-            case Op::OpImageFetch: case Op::OpImageRead: case Op::OpImageGather: case Op::OpImageDrefGather: look(at.operand(1)); break;
-            case Op::OpAtomicStore: case Op::OpAtomicExchange: case Op::OpAtomicIAdd: case Op::OpAtomicISub: case Op::OpAtomicSMin:
-            case Op::OpAtomicUMin: case Op::OpAtomicSMax: case Op::OpAtomicUMax: case Op::OpAtomicAnd: case Op::OpAtomicOr:
-            case Op::OpAtomicXor: case Op::OpAtomicFAddEXT: look(at.operand(3)); break;
+            case Op::OpImageSampleImplicitLod:
+            case Op::OpImageSampleExplicitLod:
+            case Op::OpImageSampleDrefImplicitLod:
+            case Op::OpImageSampleDrefExplicitLod:
+            case Op::OpImageSampleProjImplicitLod:
+            case Op::OpImageSampleProjExplicitLod:
+            case Op::OpImageFetch:
+            case Op::OpImageRead:
+            case Op::OpImageGather:
+            case Op::OpImageDrefGather: look(at.operand(1)); break;
+            case Op::OpAtomicStore:
+            case Op::OpAtomicExchange:
+            case Op::OpAtomicIAdd:
+            case Op::OpAtomicISub:
+            case Op::OpAtomicSMin:
+            case Op::OpAtomicUMin:
+            case Op::OpAtomicSMax:
+            case Op::OpAtomicUMax:
+            case Op::OpAtomicAnd:
+            case Op::OpAtomicOr:
+            case Op::OpAtomicXor:
+            case Op::OpAtomicFAddEXT: look(at.operand(3)); break;
             default: break;
         }
     }
     if (!looks_for(check_traps)) return;
     switch (at.op) {
-        case Op::OpUDiv: case Op::OpSDiv: case Op::OpUMod: case Op::OpSRem: case Op::OpSMod: case Op::OpFDiv: case Op::OpFRem:
+        case Op::OpUDiv:
+        case Op::OpSDiv:
+        case Op::OpUMod:
+        case Op::OpSRem:
+        case Op::OpSMod:
+        case Op::OpFDiv:
+        case Op::OpFRem:
         case Op::OpFMod: {
             llvm::Value* bad = nullptr;
             for (const Component& divisor : get(at.operand(1)).components) {
@@ -238,11 +270,30 @@ void Emitter::check_operands(const Instruction& at) {
 void Emitter::check_result(const Instruction& at) {
     if (!looks_for(check_traps | check_sanitize) || !at.result || !at.type || !module.has_type(at.type)) return;
     switch (at.op) {
-        case Op::OpFAdd: case Op::OpFSub: case Op::OpFMul: case Op::OpFDiv: case Op::OpFRem: case Op::OpFMod: case Op::OpFConvert:
-        case Op::OpVectorTimesScalar: case Op::OpMatrixTimesScalar: case Op::OpVectorTimesMatrix: case Op::OpMatrixTimesVector:
-        case Op::OpMatrixTimesMatrix: case Op::OpOuterProduct: case Op::OpDot: case Op::OpExtInst: case Op::OpDPdx: case Op::OpDPdy:
-        case Op::OpFwidth: case Op::OpDPdxFine: case Op::OpDPdyFine: case Op::OpFwidthFine: case Op::OpDPdxCoarse:
-        case Op::OpDPdyCoarse: case Op::OpFwidthCoarse: break;
+        case Op::OpFAdd:
+        case Op::OpFSub:
+        case Op::OpFMul:
+        case Op::OpFDiv:
+        case Op::OpFRem:
+        case Op::OpFMod:
+        case Op::OpFConvert:
+        case Op::OpVectorTimesScalar:
+        case Op::OpMatrixTimesScalar:
+        case Op::OpVectorTimesMatrix:
+        case Op::OpMatrixTimesVector:
+        case Op::OpMatrixTimesMatrix:
+        case Op::OpOuterProduct:
+        case Op::OpDot:
+        case Op::OpExtInst:
+        case Op::OpDPdx:
+        case Op::OpDPdy:
+        case Op::OpFwidth:
+        case Op::OpDPdxFine:
+        case Op::OpDPdyFine:
+        case Op::OpFwidthFine:
+        case Op::OpDPdxCoarse:
+        case Op::OpDPdyCoarse:
+        case Op::OpFwidthCoarse: break;
         default: return;
     }
     const auto is_float = [](const Component& value) { return value.value->getType()->isFPOrFPVectorTy(); };
@@ -258,7 +309,8 @@ void Emitter::check_result(const Instruction& at) {
         };
         join(into.nan, builder.CreateFCmpUNO(value.value, value.value));
         if (wants_infinity)
-            join(into.infinite, builder.CreateFCmpOEQ(math.f_abs(value.value), llvm::ConstantFP::getInfinity(value.value->getType())));
+            join(into.infinite,
+                 builder.CreateFCmpOEQ(math.f_abs(value.value), llvm::ConstantFP::getInfinity(value.value->getType())));
     };
     Found operands, result;
     for (std::size_t i = at.op == Op::OpExtInst ? 2 : 0; i < at.operands.size(); ++i) {
@@ -279,7 +331,8 @@ void Emitter::check_result(const Instruction& at) {
     check_fault(ShaderFault::infinity, builder.CreateAnd(result.infinite, was_finite), {});
 }
 
-void Emitter::check_index(const Component& index, const Component& bound, const std::string& object, const Pointer* pointer) {
+void Emitter::check_index(const Component& index, const Component& bound, const std::string& object,
+                          const Pointer* pointer) {
     if (!looks_for(check_traps | check_sanitize)) return;
     llvm::Value *at = widen(index), *end = widen(bound);
     check_fault(ShaderFault::index_range, builder.CreateICmpUGE(at, end), object, index, bound, pointer);
@@ -299,10 +352,14 @@ void Emitter::check_range(const Pointer& pointer) {
     if (!fits) return;
     llvm::Value* bad = builder.CreateNot(widen(fits));
     if (pointer.valid) bad = builder.CreateAnd(bad, widen(pointer.valid));
-    const Component last = pointer.dynamic_offset ? apply({pointer.dynamic_offset}, [&](auto v) {
-        return builder.CreateAdd(v[0], llvm::ConstantInt::getSigned(v[0]->getType(), pointer.offset + bytes - 1));
-    })
-                                                  : Component(int64(pointer.offset + bytes - 1));
+    const Component last =
+        pointer.dynamic_offset
+            ? apply({pointer.dynamic_offset},
+                    [&](auto v) {
+                        return builder.CreateAdd(
+                            v[0], llvm::ConstantInt::getSigned(v[0]->getType(), pointer.offset + bytes - 1));
+                    })
+            : Component(int64(pointer.offset + bytes - 1));
     check_fault(ShaderFault::index_range, bad, pointer.path + ", counted in bytes", last, pointer.limit, &pointer);
 }
 
@@ -314,7 +371,8 @@ void Emitter::check_quads() {
     llvm::Value* full = builder.CreateAnd(builder.CreateAnd(pairs, builder.CreateLShr(pairs, 2)), int32(quads));
     llvm::Value* whole = builder.CreateMul(full, int32(15));
     llvm::Value* bad = builder.CreateAnd(bits, builder.CreateNot(whole));
-    check_fault(ShaderFault::nonuniform_derivative, builder.CreateBitCast(builder.CreateTrunc(bad, builder.getIntNTy(lanes)), mask_type), {});
+    check_fault(ShaderFault::nonuniform_derivative,
+                builder.CreateBitCast(builder.CreateTrunc(bad, builder.getIntNTy(lanes)), mask_type), {});
 }
 
 // ---- What nothing has written -----------------------------------------------------------------------------------
@@ -324,7 +382,8 @@ void Emitter::check_undefined(std::span<const Component> components, const std::
     llvm::Value* bad = nullptr;
     for (const Component& component : components) {
         if (!component.undefined) continue;
-        llvm::Value* more = component.undefined->getType()->isVectorTy() ? component.undefined : splat(component.undefined);
+        llvm::Value* more =
+            component.undefined->getType()->isVectorTy() ? component.undefined : splat(component.undefined);
         bad = bad ? builder.CreateOr(bad, more) : more;
     }
     if (bad) check_fault(ShaderFault::uninitialized_read, bad, object);
@@ -381,7 +440,8 @@ void Emitter::refine_undefined(Op op, std::span<const std::uint32_t> operands, s
                 result[i].undefined = nullptr;
                 continue;
             }
-            undefined = builder.CreateOr(undefined_in(a), builder.CreateSelect(shaped(a.value), undefined_in(b), undefined_in(c)));
+            undefined = builder.CreateOr(undefined_in(a),
+                                         builder.CreateSelect(shaped(a.value), undefined_in(b), undefined_in(c)));
         } else {
             if (!a.undefined && !b.undefined) continue;
             // One side alone may decide: false for "and", true for "or".
@@ -397,7 +457,8 @@ void Emitter::refine_undefined(Op op, std::span<const std::uint32_t> operands, s
 }
 
 void Emitter::mark_undefined(LaneVariable& variable, bool is_undefined) {
-    const std::uint64_t bytes = std::uint64_t{module.type(variable.type).components} * 4 * (variable.is_uniform ? 1 : lanes);
+    const std::uint64_t bytes =
+        std::uint64_t{module.type(variable.type).components} * 4 * (variable.is_uniform ? 1 : lanes);
     builder.CreateMemSet(variable.undefined->memory, builder.getInt8(is_undefined ? 0xff : 0), bytes, llvm::Align(4));
 }
 
@@ -426,7 +487,8 @@ void Emitter::note_write(const Pointer& pointer, std::int64_t extra, const Type&
     check_memory(pointer, extra, scalar, access_write, value.undefined);
 }
 
-llvm::Value* Emitter::check_memory(const Pointer& pointer, std::int64_t extra, const Type& scalar, std::uint32_t access, llvm::Value* undefined) {
+llvm::Value* Emitter::check_memory(const Pointer& pointer, std::int64_t extra, const Type& scalar, std::uint32_t access,
+                                   llvm::Value* undefined) {
     CheckNotes& all = notes();
     const Variable* variable = module.variable(pointer.root);
     if (!variable) return nullptr;
@@ -438,7 +500,9 @@ llvm::Value* Emitter::check_memory(const Pointer& pointer, std::int64_t extra, c
         Id block = variable->type;
         while (module.type(block).kind == TypeKind::array || module.type(block).kind == TypeKind::runtime_array)
             block = module.type(block).element;
-        const auto is_either = [&](const std::unordered_set<Id>& marked) { return marked.contains(pointer.root) || marked.contains(block); };
+        const auto is_either = [&](const std::unordered_set<Id>& marked) {
+            return marked.contains(pointer.root) || marked.contains(block);
+        };
         if (!pointer.invariant && !is_either(all.read_only) && !is_either(all.coherent)) access |= access_shared;
     } else {
         return nullptr;
@@ -458,13 +522,15 @@ llvm::Value* Emitter::check_memory(const Pointer& pointer, std::int64_t extra, c
     if (undefined) undefined_bits = mask_bits(undefined->getType()->isVectorTy() ? undefined : splat(undefined));
     llvm::Type* word = builder.getInt32Ty();
     llvm::Value* bits = builder.CreateCall(
-        external("nacre_cpu_check_memory", word, {pointer_type, pointer_type, pointer_type, pointer_type, word, word, word, word}),
+        external("nacre_cpu_check_memory", word,
+                 {pointer_type, pointer_type, pointer_type, pointer_type, word, word, word, word}),
         {all.running, check_site(pointer.path, set, binding), descriptors_at, addresses_at, int32(bytes),
          int32(static_cast<std::int32_t>(access)), mask_bits(lanes_on), undefined_bits});
     return builder.CreateBitCast(builder.CreateTrunc(bits, builder.getIntNTy(lanes)), mask_type);
 }
 
-llvm::Value* Emitter::check_image(llvm::Value* image, llvm::Value* sampler, std::uint32_t flags, llvm::Value* lanes_on) {
+llvm::Value* Emitter::check_image(llvm::Value* image, llvm::Value* sampler, std::uint32_t flags,
+                                  llvm::Value* lanes_on) {
     const Variable* variable = module.variable(image_root);
     const auto operation = static_cast<ImageOperation>(flags & image_operation_mask);
     if (!variable || operation == ImageOperation::query_lod) return nullptr;
@@ -472,9 +538,11 @@ llvm::Value* Emitter::check_image(llvm::Value* image, llvm::Value* sampler, std:
     if (notes().coherent.contains(image_root) || notes().read_only.contains(image_root)) flags |= image_unshared;
     llvm::Value* counted = live_slot ? both(lanes_on, live()) : lanes_on;
     llvm::Value* bits = builder.CreateCall(
-        external("nacre_cpu_check_image", word, {pointer_type, pointer_type, pointer_type, pointer_type, pointer_type, word, word}),
+        external("nacre_cpu_check_image", word,
+                 {pointer_type, pointer_type, pointer_type, pointer_type, pointer_type, word, word}),
         {notes().running,
-         check_site(name_of(image_root), static_cast<std::int32_t>(variable->set.value_or(0)), static_cast<std::int32_t>(variable->binding.value_or(0))),
+         check_site(name_of(image_root), static_cast<std::int32_t>(variable->set.value_or(0)),
+                    static_cast<std::int32_t>(variable->binding.value_or(0))),
          image, sampler, image_memory(), int32(static_cast<std::int32_t>(flags)), mask_bits(counted)});
     if (!follows_undefined() || operation == ImageOperation::store) return nullptr;
     return builder.CreateBitCast(builder.CreateTrunc(bits, builder.getIntNTy(lanes)), mask_type);

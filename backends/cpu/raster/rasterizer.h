@@ -71,7 +71,7 @@ struct DrawCall {
 /// gl_PointSize is kept between 1 and this.
 inline constexpr float largest_point_size = 255.0f;
 
-/// For tests; the results are the same whatever is chosen.
+/// For tests and hostile order; the results are the same whatever is chosen.
 struct RasterizerOptions {
     std::uint32_t instruction_set = 2;  ///< At most: 0 the baseline of the processor family, 1 AVX2, 2 AVX-512.
     bool hierarchical_depth = true;

@@ -3,13 +3,13 @@
 //
 //     cpu_clean_test                                   10 shaders with fixed seeds
 //     cpu_clean_test --seed=1000 --count=10000
+#include <gtest/gtest.h>
+
 #include <cstdlib>
 #include <iostream>
 #include <string>
 #include <string_view>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 #include "tests/backends/cpu/differential/device_runner.h"
 
@@ -53,8 +53,10 @@ int main(int argc, char** argv) {
     testing::InitGoogleTest(&argc, argv);
     for (int i = 1; i < argc; ++i) {
         const std::string_view argument = argv[i];
-        if (argument.starts_with("--seed=")) nacre::differential::settings.seed = std::strtoull(argv[i] + 7, nullptr, 10);
-        if (argument.starts_with("--count=")) nacre::differential::settings.count = std::strtoull(argv[i] + 8, nullptr, 10);
+        if (argument.starts_with("--seed="))
+            nacre::differential::settings.seed = std::strtoull(argv[i] + 7, nullptr, 10);
+        if (argument.starts_with("--count="))
+            nacre::differential::settings.count = std::strtoull(argv[i] + 8, nullptr, 10);
     }
     return RUN_ALL_TESTS();
 }

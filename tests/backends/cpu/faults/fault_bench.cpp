@@ -48,8 +48,11 @@ FaultBench::FaultBench(const std::string& backend) {
     using enum rhi::TextureUsage;
     output = ok(device_->create_buffer({.size = 1024, .usage = buffer_usage, .name = "output"}));
     input = ok(device_->create_buffer({.size = 256, .usage = buffer_usage, .name = "input"}));
-    const rhi::TextureDesc words{.format = rhi::Format::r32_uint, .width = 8, .height = 8,
-                                 .usage = storage | sampled | copy_destination | copy_source, .name = "picture"};
+    const rhi::TextureDesc words{.format = rhi::Format::r32_uint,
+                                 .width = 8,
+                                 .height = 8,
+                                 .usage = storage | sampled | copy_destination | copy_source,
+                                 .name = "picture"};
     picture = ok(device_->create_texture(words));
     rhi::TextureDesc named = words;
     named.name = "numbers";

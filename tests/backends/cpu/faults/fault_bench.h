@@ -14,9 +14,9 @@ namespace nacre::cpu {
 
 /// A device that looks for faults, and a few resources for small shaders.
 ///
-/// Set 0 of compute shaders: binding 0 buffer 'output' (256 words, nothing has written them), 1 buffer 'input' (64 words,
-/// 0 to 63), 2 image 'picture' (8x8 words, nothing has written them), 3 texture 'numbers' (8x8 words, 0 to 63), 4 sampler
-/// 'nearest', 5 texture 'target'. Shaders declare what they use.
+/// Set 0 of compute shaders: binding 0 buffer 'output' (256 words, nothing has written them), 1 buffer 'input' (64
+/// words, 0 to 63), 2 image 'picture' (8x8 words, nothing has written them), 3 texture 'numbers' (8x8 words, 0 to 63),
+/// 4 sampler 'nearest', 5 texture 'target'. Shaders declare what they use.
 class FaultBench {
   public:
     explicit FaultBench(const std::string& backend);

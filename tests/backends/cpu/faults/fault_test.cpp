@@ -20,8 +20,8 @@ using ::testing::HasSubstr;
 /// A compute or fragment shader with one faulty line.
 struct PlantedFault {
     const char* name;
-    const char* checks;      ///< Of the device.
-    const char* path;        ///< The extension tells the stage.
+    const char* checks;  ///< Of the device.
+    const char* path;    ///< The extension tells the stage.
     const char* text;
     const char* code;        ///< "N-804"
     const char* object;      ///< Part of the message; may be empty.
@@ -36,34 +36,39 @@ layout(set = 0, binding = 0) buffer Output { float words[256]; } result;
 void main() {
     float x = float(gl_LocalInvocationIndex) - 5.0;
     result.words[gl_LocalInvocationIndex] = sqrt(x); // FAULT
-})", "N-801", "", "invocation (0, 0, 0)"},
+})",
+     "N-801", "", "invocation (0, 0, 0)"},
     {"TrapInfinity", "traps", "infinity.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 0) buffer Output { float words[256]; } result;
 void main() {
     float x = exp2(float(gl_LocalInvocationIndex) * 18.0);
     result.words[gl_LocalInvocationIndex] = x * x; // FAULT
-})", "N-802", "", "invocation (4, 0, 0)"},
+})",
+     "N-802", "", "invocation (4, 0, 0)"},
     {"TrapIntegerDivision", "traps", "division.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
 layout(set = 0, binding = 1) readonly buffer Input { uint words[64]; } numbers;
 void main() {
     uint i = gl_GlobalInvocationID.x;
     result.words[i] = 100u / (numbers.words[i] ^ 3u); // FAULT
-})", "N-803", "", "invocation (3, 0, 0)"},
+})",
+     "N-803", "", "invocation (3, 0, 0)"},
     {"TrapFloatDivision", "traps", "quotient.frag", R"(layout(location = 0) out vec4 color;
 void main() {
     color = vec4(1.0);
     if (gl_FragCoord.x > 4.0) {
         color.x = 1.0 / (gl_FragCoord.y - 2.5); // FAULT
     }
-})", "N-803", "", "pixel (4, 2)"},
+})",
+     "N-803", "", "pixel (4, 2)"},
     {"TrapBufferIndex", "traps", "range.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 1) readonly buffer Input { uint words[]; } numbers;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
 void main() {
     uint i = gl_GlobalInvocationID.x;
     result.words[i] = numbers.words[i * 10u]; // FAULT
-})", "N-804", "'numbers.words' (buffer 'input')", "invocation (7, 0, 0)"},
+})",
+     "N-804", "'numbers.words' (buffer 'input')", "invocation (7, 0, 0)"},
     {"TrapLocalIndex", "traps", "local.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 1) readonly buffer Input { uint words[64]; } numbers;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
@@ -71,7 +76,8 @@ void main() {
     uint table[6] = uint[6](1u, 2u, 3u, 4u, 5u, 6u);
     table[numbers.words[1]] = gl_GlobalInvocationID.x;
     result.words[gl_GlobalInvocationID.x] = table[numbers.words[gl_GlobalInvocationID.x]]; // FAULT
-})", "N-804", "table", "invocation (6, 0, 0)"},
+})",
+     "N-804", "table", "invocation (6, 0, 0)"},
 
     {"SanitizeVariable", "sanitize", "variable.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
@@ -81,7 +87,8 @@ void main() {
     uint i = gl_GlobalInvocationID.x;
     if (numbers.words[i] > 2u) chosen = i;
     result.words[i] = chosen + 1u; // FAULT
-})", "N-805", "chosen", "invocation (0, 0, 0)"},
+})",
+     "N-805", "chosen", "invocation (0, 0, 0)"},
     {"SanitizeBuffer", "sanitize", "unwritten.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
 void main() {
@@ -89,26 +96,30 @@ void main() {
     result.words[i] = i;
     uint next = result.words[i + (i == 5u ? 100u : 0u)];
     if (next > 100u) result.words[i + 200u] = 1u; // FAULT
-})", "N-805", "'result.words' (buffer 'output'), read at unwritten.comp:6", "invocation (5, 0, 0)"},
+})",
+     "N-805", "'result.words' (buffer 'output'), read at unwritten.comp:6", "invocation (5, 0, 0)"},
     {"SanitizeImageRange", "sanitize", "image.comp", R"(layout(local_size_x = 4, local_size_y = 4) in;
 layout(set = 0, binding = 2, r32ui) uniform writeonly uimage2D picture;
 void main() {
     ivec2 at = ivec2(gl_GlobalInvocationID.xy) * 3;
     imageStore(picture, at - ivec2(0, 1), uvec4(1u)); // FAULT
-})", "N-804", "texture 'picture'", "invocation (0, 0, 0)"},
+})",
+     "N-804", "texture 'picture'", "invocation (0, 0, 0)"},
     {"SanitizeBufferIndex", "sanitize", "index.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
 layout(set = 0, binding = 1) readonly buffer Input { uint words[64]; } numbers;
 void main() {
     uint i = numbers.words[gl_GlobalInvocationID.x];
     result.words[i - 1u] = 7u; // FAULT
-})", "N-804", "buffer 'output'", "invocation (0, 0, 0)"},
+})",
+     "N-804", "buffer 'output'", "invocation (0, 0, 0)"},
     {"SanitizeRaceInBuffer", "sanitize", "race.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
 void main() {
     uint i = gl_GlobalInvocationID.x;
     result.words[i / 2u] = i; // FAULT
-})", "N-806", "buffer 'output'", "invocation (1, 0, 0)"},
+})",
+     "N-806", "buffer 'output'", "invocation (1, 0, 0)"},
     {"SanitizeRaceInWorkgroup", "sanitize", "shared.comp", R"(layout(local_size_x = 32) in;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
 shared uint part[32];
@@ -119,14 +130,16 @@ void main() {
     part[i] = i;
     uint next = part[(i + 1u) % 32u]; // FAULT
     result.words[i] = next;
-})", "N-806", "part", "invocation ("},
+})",
+     "N-806", "part", "invocation ("},
     {"SanitizeDerivative", "sanitize", "derivative.frag", R"(layout(location = 0) out vec4 color;
 void main() {
     color = vec4(0.0);
     if (gl_FragCoord.x > 3.0) {
         color.x = dFdx(gl_FragCoord.y * gl_FragCoord.x); // FAULT
     }
-})", "N-807", "", "pixel (3, 0)"},
+})",
+     "N-807", "", "pixel (3, 0)"},
     {"SanitizeImplicitLevel", "sanitize", "implicit.frag", R"(layout(location = 0) out vec4 color;
 layout(set = 0, binding = 3) uniform utexture2D numbers;
 layout(set = 0, binding = 4) uniform sampler nearest;
@@ -135,7 +148,8 @@ void main() {
     if (gl_FragCoord.y < 4.0 && gl_FragCoord.x > 5.0) {
         color = vec4(texture(usampler2D(numbers, nearest), gl_FragCoord.xy / 8.0)); // FAULT
     }
-})", "N-807", "", "pixel (5, 0)"},
+})",
+     "N-807", "", "pixel (5, 0)"},
     {"SanitizeBirthOfNaN", "sanitize", "birth.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 0) buffer Output { float words[256]; } result;
 layout(set = 0, binding = 1) readonly buffer Input { uint words[64]; } numbers;
@@ -143,12 +157,14 @@ void main() {
     uint i = gl_GlobalInvocationID.x;
     vec3 direction = normalize(vec3(float(numbers.words[i]) - 3.0, 0.0, 0.0)); // FAULT
     result.words[i] = direction.x;
-})", "N-801", "", "invocation (3, 0, 0)"},
+})",
+     "N-801", "", "invocation (3, 0, 0)"},
     {"SanitizeBirthInFragment", "sanitize", "birth.frag", R"(layout(location = 0) out vec4 color;
 void main() {
     float x = gl_FragCoord.x - 6.0;
     color = vec4(pow(x, 1.5)); // FAULT
-})", "N-801", "", "pixel (0, 0)"},
+})",
+     "N-801", "", "pixel (0, 0)"},
 
     {"HostileWorkgroupMemory", "hostile", "workgroup.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
@@ -158,14 +174,16 @@ void main() {
     part[i] = i;
     barrier();
     result.words[i] = part[i + 2u]; // FAULT
-})", "N-805", "'part'", "invocation (6, 0, 0)"},
+})",
+     "N-805", "'part'", "invocation (6, 0, 0)"},
     {"HostileFirstWorkgroup", "hostile", "first.comp", R"(layout(local_size_x = 1) in;
 layout(set = 0, binding = 2, r32ui) uniform uimage2D picture;
 void main() {
     int i = int(gl_GlobalInvocationID.x);
     if (i == 0) imageStore(picture, ivec2(0), uvec4(5u));
     if (i != 0) imageStore(picture, ivec2(i, 1), imageLoad(picture, ivec2(0))); // FAULT
-})", "N-806", "texture 'picture'", "invocation (", 8},
+})",
+     "N-806", "texture 'picture'", "invocation (", 8},
 };
 
 class Planted : public ::testing::TestWithParam<PlantedFault> {};
@@ -178,8 +196,7 @@ TEST_P(Planted, IsReported) {
         SCOPED_TRACE(lanes);
         FaultBench bench(std::string("cpu:") + fault.checks + ":lanes=" + lanes);
         const std::string path = fault.path, text = fault.text;
-        const auto outcome =
-            path.ends_with(".comp") ? bench.compute(path, text, fault.groups) : bench.draw(path, text);
+        const auto outcome = path.ends_with(".comp") ? bench.compute(path, text, fault.groups) : bench.draw(path, text);
         const bool stops = std::string(fault.checks).find("traps") != std::string::npos;
         EXPECT_EQ(outcome.has_value(), !stops);
         const std::vector<rhi::Message> messages = bench.messages();
@@ -258,22 +275,22 @@ void main() {
     float x = float(gl_GlobalInvocationID.x);
     float root = sqrt(x - 1.0);
     result.words[gl_GlobalInvocationID.x] = root + 1.0 / (x - 3.0);
-})", 64);
+})",
+                                       64);
     ASSERT_FALSE(outcome);
     EXPECT_EQ(outcome.error().code, ErrorCode::device_lost);
     EXPECT_THAT(outcome.error().message(), HasSubstr("two.comp:5"));
     EXPECT_THAT(outcome.error().message(), HasSubstr("invocation (0, 0, 0)"));
     EXPECT_EQ(bench.messages().size(), 1u);
     FaultBench again("cpu:traps");
-    EXPECT_TRUE(again.compute("none.comp", "layout(local_size_x = 1) in;\nvoid main() {}"))
-        << "a new device works";
+    EXPECT_TRUE(again.compute("none.comp", "layout(local_size_x = 1) in;\nvoid main() {}")) << "a new device works";
 }
 
 TEST(CpuHostile, StatedUsesAreSilent) {
     FaultBench bench("cpu:hostile");
-    const auto words = copy_with_statement(bench, {{.buffer = bench.input, .use = rhi::ResourceUse::storage_read},
-                                                   {.buffer = bench.output, .use = rhi::ResourceUse::storage_read |
-                                                                                   rhi::ResourceUse::storage_write}});
+    const auto words = copy_with_statement(
+        bench, {{.buffer = bench.input, .use = rhi::ResourceUse::storage_read},
+                {.buffer = bench.output, .use = rhi::ResourceUse::storage_read | rhi::ResourceUse::storage_write}});
     EXPECT_TRUE(bench.messages().empty());
     EXPECT_EQ(words[5], 5u);
     EXPECT_EQ(words[100], 7u);
@@ -364,8 +381,10 @@ void main() {
 TEST(CpuHostile, ResultsAreThereOnlyForThoseWhoWait) {
     FaultBench bench("cpu:hostile");
     rhi::Device& device = bench.device();
-    const auto read_back = *device.create_buffer({.size = 256, .usage = rhi::BufferUsage::copy_destination,
-                                                  .memory = rhi::MemoryKind::readback, .name = "result"});
+    const auto read_back = *device.create_buffer({.size = 256,
+                                                  .usage = rhi::BufferUsage::copy_destination,
+                                                  .memory = rhi::MemoryKind::readback,
+                                                  .name = "result"});
     const auto copy = [&] {
         rhi::CommandList list = device.create_command_list("copy");
         list.copy_buffer(bench.input, 0, read_back, 0, 256);
@@ -392,8 +411,8 @@ TEST(CpuHostile, ResultsAreThereOnlyForThoseWhoWait) {
 TEST(CpuHostile, UploadMemoryIsNotWrittenWhileItIsRead) {
     FaultBench bench("cpu:hostile");
     rhi::Device& device = bench.device();
-    const auto upload = *device.create_buffer({.size = 256, .usage = rhi::BufferUsage::copy_source,
-                                               .memory = rhi::MemoryKind::upload, .name = "stream"});
+    const auto upload = *device.create_buffer(
+        {.size = 256, .usage = rhi::BufferUsage::copy_source, .memory = rhi::MemoryKind::upload, .name = "stream"});
     const auto write = [&](std::uint32_t value) {
         const auto bytes = device.map(upload);
         for (std::size_t i = 0; i < 64; ++i) std::memcpy(bytes->data() + i * 4, &value, 4);
@@ -415,7 +434,8 @@ TEST(CpuHostile, UploadMemoryIsNotWrittenWhileItIsRead) {
 TEST(CpuHostile, AskingAgainAndAgainIsAWayToWait) {
     FaultBench bench("cpu:hostile");
     const rhi::Fence fence = *bench.device().submit(bench.device().create_command_list("empty"));
-    for (int i = 0; i < 10000 && !bench.device().is_complete(fence); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    for (int i = 0; i < 10000 && !bench.device().is_complete(fence); ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
     EXPECT_TRUE(bench.device().is_complete(fence));
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whole frames of this project on devices that look for faults: there are none.
+#include <gtest/gtest.h>
+
 #include <mutex>
 #include <string>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 #include "backends/cpu/cpu_backend.h"
 #include "passes/renderer.h"
