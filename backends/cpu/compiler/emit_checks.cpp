@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <llvm/IR/Constants.h>
 #include <llvm/IR/GlobalVariable.h>
-#include <llvm/IR/MDBuilder.h>
 
 #include <algorithm>
 #include <array>
@@ -172,11 +171,7 @@ void Emitter::check_fault(ShaderFault kind, llvm::Value* bad, const std::string&
     if (const auto* never = llvm::dyn_cast<llvm::Constant>(bad); never && never->isNullValue()) return;
     CheckNotes& all = notes();
     llvm::Value* bits = mask_bits(both(effect_mask(), bad));
-    llvm::BasicBlock* report = llvm::BasicBlock::Create(context, "fault", function_);
-    llvm::BasicBlock* after = llvm::BasicBlock::Create(context, "no_fault", function_);
-    builder.CreateCondBr(builder.CreateICmpNE(bits, int32(0)), report, after,
-                         llvm::MDBuilder(context).createBranchWeights(1, 1 << 20));
-    builder.SetInsertPoint(report);
+    // Called for no lane too: branches around thousands of calls would cost LLVM more time than the calls do.
     const auto put = [&](const Component& value, llvm::AllocaInst*& slot) -> llvm::Value* {
         if (!value) return llvm::ConstantPointerNull::get(pointer_type);
         llvm::Type* wide = vector_of(builder.getInt64Ty());
@@ -197,8 +192,6 @@ void Emitter::check_fault(ShaderFault kind, llvm::Value* bad, const std::string&
                                  pointer_type, pointer_type}),
                        {all.running, check_site(object, set, binding), int32(static_cast<std::int32_t>(kind)), bits,
                         descriptor_at, found_values, limit_values});
-    builder.CreateBr(after);
-    builder.SetInsertPoint(after);
 }
 
 void Emitter::check_operands(const Instruction& at) {
