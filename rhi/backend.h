@@ -140,12 +140,24 @@ struct BarrierBatch {
     std::uint32_t first = 0, count = 0;             ///< Into ExecutionPlan::barriers.
 };
 
+/// A use of a resource that the commands of a statement make and the statement does not name. One object is set.
+struct UnstatedUse {
+    const CommandHeader* statement = nullptr;  ///< The command that begins it.
+    BackendBuffer* buffer = nullptr;
+    BackendTexture* texture = nullptr;
+    BackendAccelerationStructure* acceleration_structure = nullptr;
+    ResourceUse stated = ResourceUse::none, found = ResourceUse::none;
+};
+
 /// One submission: resolved streams in order, and their barriers in the order of the commands.
 struct ExecutionPlan {
     std::span<CommandStream* const> streams;
     std::span<const BarrierBatch> batches;
     std::span<const Barrier> barriers;
     std::uint64_t serial = 0;  ///< Rises by one with every plan.
+    // Only where the backend wants them (see `BackendDevice::wants_uses`).
+    std::span<const UnstatedUse> unstated;
+    std::span<BackendBuffer* const> host_buffers;  ///< That the commands use and the host can map.
 };
 
 /// What a backend gets to make a device.
@@ -164,6 +176,9 @@ class BackendDevice {
     /// Unrestricted; the front end applies the restriction. A backend that could use more than the restriction
     /// grants (extensions, say) must not: `BackendDeviceDesc::desc->restriction` tells.
     [[nodiscard]] virtual const Capabilities& capabilities() const = 0;
+
+    /// Plans tell more than is needed to execute them, for backends that look for faults.
+    [[nodiscard]] virtual bool wants_uses() const { return false; }
 
     virtual Expected<std::unique_ptr<BackendBuffer>> create_buffer(const BufferDesc& desc) = 0;
     virtual Expected<std::unique_ptr<BackendTexture>> create_texture(const TextureDesc& desc) = 0;
@@ -219,6 +234,8 @@ class Backend {
         std::string_view name, meaning;
     };
     [[nodiscard]] virtual std::span<const Mode> modes() const = 0;
+    /// What can be looked for while shaders run, each a word beside the mode, with a sentence for help texts.
+    [[nodiscard]] virtual std::span<const Mode> checks() const { return {}; }
     /// True where `lanes=` or `threads=` mean something.
     [[nodiscard]] virtual bool accepts_lanes() const { return false; }
     [[nodiscard]] virtual bool accepts_threads() const { return false; }

@@ -34,10 +34,14 @@ namespace nacre::rhi {
 class Backend;
 class BackendDevice;
 
-/// `NAME[:MODE][:lanes=N][:threads=N]`, as written on every command line.
+/// `NAME[:MODE][:CHECK]...[:lanes=N][:threads=N]`, as written on every command line.
 struct BackendSpec {
     std::string name;          ///< "vulkan", "gl", "gles", "auto".
-    std::string mode;          ///< Backend-specific; empty: the default.
+    /// Backend-specific; empty: the default. The first word behind the name, until the backend is known: then it may turn
+    /// out to be a check.
+    std::string mode;
+    std::vector<std::string> checks{};  ///< Backend-specific: what is looked for while shaders run.
+    std::uint32_t seed = 0;    ///< Of the check `hostile=N`; 0: not given.
     std::uint32_t lanes = 0;   ///< 0: not given.
     std::uint32_t threads = 0; ///< 0: not given.
     /// Parses the text. Errors name the part that is wrong and what is allowed; whether a backend knows the mode

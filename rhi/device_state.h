@@ -185,7 +185,8 @@ struct DeviceState {
     Expected<std::uint64_t> submit_streams(std::span<CommandStream* const> streams, bool consume_writes);
     /// The layout of this content; its bindings are checked and sorted.
     Expected<BindGroupLayout> layout_of(BindGroupLayoutDesc sorted);
-    Expected<std::uint64_t> execute(std::span<CommandStream* const> streams, bool has_writes);
+    Expected<std::uint64_t> execute(std::span<CommandStream* const> streams, bool has_writes,
+                                    std::span<const UnstatedUse> unstated = {});
     /// Submits one copy of a resource into staging memory, behind everything that waits.
     Expected<std::uint64_t> submit_read(CommandStream& stream, BufferObject* buffer, TextureObject* texture,
                                         const SubresourceRange& range, BackendBuffer& staging_buffer);

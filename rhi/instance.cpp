@@ -18,7 +18,7 @@ std::uint16_t next_device_number() {
 
 std::unexpected<Error> spec_error(std::string_view text, std::string reason) {
     return fail(ErrorCode::invalid_argument, "read backend", fmt::format("'{}'", text), std::move(reason),
-                "A backend is written NAME[:MODE][:lanes=N][:threads=N], as in 'vulkan' or 'gl:osmesa'.");
+                "A backend is written NAME[:MODE][:CHECK][:lanes=N][:threads=N], as in 'vulkan' or 'cpu:sanitize'.");
 }
 
 }  // namespace
@@ -31,6 +31,7 @@ Expected<BackendSpec> BackendSpec::parse(std::string_view text) {
     };
     BackendSpec spec;
     std::size_t at = 0;
+    bool is_past_words = false;
     for (int part = 0;; ++part) {
         const std::size_t end = std::min(text.find(':', at), text.size());
         const std::string_view word = text.substr(at, end - at);
@@ -46,16 +47,28 @@ Expected<BackendSpec> BackendSpec::parse(std::string_view text) {
             const auto [stop, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
             if (error != std::errc{} || stop != digits.data() + digits.size() || value == 0)
                 return spec_error(text, fmt::format("expected a number above 0 for '{}', found '{}'", option, digits));
-            std::uint32_t* target = option == "lanes" ? &spec.lanes : option == "threads" ? &spec.threads : nullptr;
+            std::uint32_t* target = option == "lanes"     ? &spec.lanes
+                                    : option == "threads" ? &spec.threads
+                                    : option == "hostile" ? &spec.seed
+                                                          : nullptr;
             if (!target)
-                return spec_error(text, fmt::format("expected the options lanes or threads, found '{}'", option));
+                return spec_error(text,
+                                  fmt::format("expected the options lanes, threads or hostile, found '{}'", option));
             if (*target != 0) return spec_error(text, fmt::format("expected '{}' once, found it twice", option));
             *target = value;
+            is_past_words = is_past_words || target != &spec.seed;
+            if (target == &spec.seed) spec.checks.emplace_back(option);
         } else {
-            if (part != 1 || !is_word(word))
+            if (is_past_words || !is_word(word))
                 return spec_error(
-                    text, fmt::format("expected a mode or an option 'name=number' after the name, found '{}'", word));
-            spec.mode = word;
+                    text, fmt::format("expected a mode, a check or an option 'name=number' after the name, found '{}'",
+                                      word));
+            if (part == 1)
+                spec.mode = word;
+            else if (std::ranges::find(spec.checks, word) == spec.checks.end() && word != spec.mode)
+                spec.checks.emplace_back(word);
+            else
+                return spec_error(text, fmt::format("expected '{}' once, found it twice", word));
         }
         if (end == text.size()) break;
         at = end + 1;
@@ -66,6 +79,8 @@ Expected<BackendSpec> BackendSpec::parse(std::string_view text) {
 std::string BackendSpec::text() const {
     std::string text = name;
     if (!mode.empty()) text += ":" + mode;
+    for (const std::string& check : checks)
+        text += check == "hostile" && seed != 0 ? fmt::format(":hostile={}", seed) : ":" + check;
     if (lanes != 0) text += ":lanes=" + std::to_string(lanes);
     if (threads != 0) text += ":threads=" + std::to_string(threads);
     return text;
@@ -115,8 +130,25 @@ std::vector<std::string> Instance::backend_names() const {
 
 Expected<std::unique_ptr<Device>> Instance::create_device(const DeviceDesc& desc) const {
     NACRE_TRY(const BackendSpec spec, BackendSpec::parse(desc.backend));
-    const auto attempt = [&](Backend& backend, const BackendSpec& wanted) -> Expected<std::unique_ptr<Device>> {
+    const auto attempt = [&](Backend& backend, BackendSpec wanted) -> Expected<std::unique_ptr<Device>> {
         const auto modes = backend.modes();
+        const auto is_check = [&](std::string_view word) {
+            return std::ranges::any_of(backend.checks(), [&](const Backend::Mode& check) { return check.name == word; });
+        };
+        if (is_check(wanted.mode)) {
+            wanted.checks.insert(wanted.checks.begin(), wanted.mode);
+            wanted.mode.clear();
+        }
+        for (const std::string& check : wanted.checks)
+            if (!is_check(check)) {
+                std::string names;
+                for (const Backend::Mode& known_check : backend.checks())
+                    names += fmt::format("{}'{}'", names.empty() ? "" : ", ", known_check.name);
+                return fail(ErrorCode::invalid_argument, "create device", "'" + desc.backend + "'",
+                            fmt::format("expected {}, found '{}'",
+                                        names.empty() ? "no checks" : "one of the checks " + names, check),
+                            "Leave it out.");
+            }
         const bool known =
             wanted.mode.empty() || std::any_of(modes.begin(), modes.end(),
                                                [&](const Backend::Mode& mode) { return mode.name == wanted.mode; });
@@ -174,7 +206,7 @@ Expected<std::unique_ptr<Device>> Instance::create_device(const DeviceDesc& desc
         }
         return attempt(*backend, spec);
     }
-    if (!spec.mode.empty() || spec.lanes != 0 || spec.threads != 0)
+    if (!spec.mode.empty() || !spec.checks.empty() || spec.lanes != 0 || spec.threads != 0)
         return spec_error(desc.backend, "expected no mode and no options for 'auto'");
     std::string reasons;
     for (const auto& backend : state_->backends) {

@@ -68,7 +68,8 @@ void record_writes(DeviceState& device, CommandStream& stream) {
 }  // namespace
 
 /// Hands a planned submission to the backend and takes note of the result.
-Expected<std::uint64_t> DeviceState::execute(std::span<CommandStream* const> streams, bool has_writes) {
+Expected<std::uint64_t> DeviceState::execute(std::span<CommandStream* const> streams, bool has_writes,
+                                             std::span<const UnstatedUse> unstated) {
     // Once for each chunk, and only now: a device may read a chunk from the flush on, so nothing more is written into
     // it until the submission is complete.
     for (const StagingChunk& chunk : staging)
@@ -83,6 +84,12 @@ Expected<std::uint64_t> DeviceState::execute(std::span<CommandStream* const> str
     plan.batches = tracker.batches();
     plan.barriers = tracker.barriers();
     plan.serial = submitted_serial + 1;
+    std::vector<BackendBuffer*> host_buffers;
+    if (backend->wants_uses())
+        for (const BufferObject* buffer : tracker.touched_buffers())
+            if (buffer->desc.memory != MemoryKind::device) host_buffers.push_back(buffer->backend.get());
+    plan.unstated = unstated;
+    plan.host_buffers = host_buffers;
     auto executed = backend->execute(plan);
     if (!executed) {
         note_failure(executed.error());
@@ -125,7 +132,7 @@ Expected<std::uint64_t> DeviceState::submit_streams(std::span<CommandStream* con
         return std::unexpected(std::move(finished).error());
     }
     for (Problem& problem : walk.statement_problems()) (void)reject(std::move(problem));
-    NACRE_TRY(const std::uint64_t serial, execute(all, has_writes));
+    NACRE_TRY(const std::uint64_t serial, execute(all, has_writes, walk.unstated_uses()));
     for (const auto& [pool, index] : walk.written_queries()) {
         pool->written[index] = true;
         pool->last_serial = serial;

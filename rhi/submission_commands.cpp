@@ -311,6 +311,8 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
             statement_name_ = stream_->strings[command.name];
             stated_.assign(command.accesses(), command.accesses() + command.count);
             actual_.clear();
+            used_objects_.clear();
+            statement_ = &header;
             return {};
         }
         case CommandType::end_statement:

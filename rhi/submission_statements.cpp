@@ -5,20 +5,25 @@
 namespace nacre::rhi {
 
 void SubmissionWalk::note_statement() {
-    if (!in_statement_ || !device_.shared->desc.verify_statements) return;
+    if (!in_statement_ || !follows_statements()) return;
+    const auto note = [&](ResourceKey key, ResourceUse use, BackendObject* object) {
+        actual_[key] |= use;
+        used_objects_[key] = object;
+    };
     for (const BufferObject* buffer : tracker_.scope_buffers())
-        actual_[{ResourceKind::buffer, buffer->handle.index}] |= buffer->scope_state.use;
+        note({ResourceKind::buffer, buffer->handle.index}, buffer->scope_state.use, buffer->backend.get());
     for (const TextureObject* texture : tracker_.scope_textures()) {
         ResourceUse use = texture->scope_state.use;
         for (const ResourceState& part : texture->scope_states) use |= part.use;
-        actual_[{ResourceKind::texture, texture->handle.index}] |= use;
+        note({ResourceKind::texture, texture->handle.index}, use, texture->backend.get());
     }
     for (const AccelerationStructureObject* structure : tracker_.scope_structures())
-        actual_[{ResourceKind::acceleration_structure, structure->handle.index}] |= structure->scope_state.use;
+        note({ResourceKind::acceleration_structure, structure->handle.index}, structure->scope_state.use,
+             structure->backend.get());
 }
 
 void SubmissionWalk::end_statement() {
-    if (!device_.shared->desc.verify_statements) return;
+    if (!follows_statements()) return;
     std::map<ResourceKey, ResourceUse> stated;
     for (const StatedAccess& access : stated_) {
         if (access.buffer) stated[{ResourceKind::buffer, access.buffer.index}] |= access.use;
@@ -26,6 +31,21 @@ void SubmissionWalk::end_statement() {
         if (access.acceleration_structure)
             stated[{ResourceKind::acceleration_structure, access.acceleration_structure.index}] |= access.use;
     }
+    for (const auto& [key, found] : actual_) {
+        const auto at = stated.find(key);
+        const ResourceUse expected = at == stated.end() ? ResourceUse::none : at->second;
+        if (!has_any(found, ~expected)) continue;
+        UnstatedUse& use = unstated_uses_.emplace_back();
+        use.statement = statement_;
+        use.stated = expected;
+        use.found = found;
+        BackendObject* object = used_objects_.at(key);
+        if (key.first == ResourceKind::buffer) use.buffer = static_cast<BackendBuffer*>(object);
+        if (key.first == ResourceKind::texture) use.texture = static_cast<BackendTexture*>(object);
+        if (key.first == ResourceKind::acceleration_structure)
+            use.acceleration_structure = static_cast<BackendAccelerationStructure*>(object);
+    }
+    if (!device_.shared->desc.verify_statements) return;
     const auto name_of_resource = [&](ResourceKey key) -> std::string {
         std::string name;
         if (key.first == ResourceKind::texture)

@@ -30,6 +30,7 @@ class SubmissionWalk {
         return written_queries_;
     }
     [[nodiscard]] std::vector<Problem>& statement_problems() { return statement_problems_; }
+    [[nodiscard]] const std::vector<UnstatedUse>& unstated_uses() const { return unstated_uses_; }
 
   private:
     using GroupUses = std::array<BindGroupObject*, most_bind_groups>;
@@ -85,6 +86,9 @@ class SubmissionWalk {
         return text;
     }
 
+    [[nodiscard]] bool follows_statements() const {
+        return device_.shared->desc.verify_statements || device_.backend->wants_uses();
+    }
     void note_statement();
     void end_statement();
 
@@ -114,6 +118,9 @@ class SubmissionWalk {
     enum class ResourceKind : std::uint8_t { buffer, texture, acceleration_structure };
     using ResourceKey = std::pair<ResourceKind, std::uint64_t>;
     std::map<ResourceKey, ResourceUse> actual_;
+    std::map<ResourceKey, BackendObject*> used_objects_;
+    const CommandHeader* statement_ = nullptr;
+    std::vector<UnstatedUse> unstated_uses_;
     std::vector<Problem> statement_problems_;
 };
 

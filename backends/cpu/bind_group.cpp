@@ -66,15 +66,24 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> CpuBindGroup::create(rhi::Backe
             const BindingSlots* slots = own.find(binding.binding);
             if (!slots || (slots->count != 0 && binding.element >= slots->count)) continue;
             Descriptor& descriptor = group->descriptors[slots->first + binding.element];
+            const auto note = [&](const std::unique_ptr<CheckedMemory>& checked) {
+                if (!checked) return;
+                group->checked.resize(count);
+                group->checked[slots->first + binding.element] = checked.get();
+            };
             if (const auto* buffer = static_cast<const CpuBuffer*>(binding.buffer)) {
                 descriptor.data = buffer->data() + binding.offset;
                 descriptor.size = std::min(binding.size, buffer->size_from(binding.offset));
                 if (buffer->shadow()) descriptor.shadow = buffer->shadow() + 2 * binding.offset;
+                note(buffer->checked);
             }
             const bool has_texture =
                 binding.type != rhi::BindingType::sampler && !binding.buffer && !binding.acceleration_structure &&
                                      binding.view.texture.object;
-            if (has_texture) descriptor.image = texture_of(binding.view.texture).view(binding.view);
+            if (has_texture) {
+                descriptor.image = texture_of(binding.view.texture).view(binding.view);
+                note(texture_of(binding.view.texture).checked);
+            }
             if (const auto* structure = static_cast<const CpuAccelerationStructure*>(binding.acceleration_structure))
                 descriptor.data = reinterpret_cast<std::byte*>(structure->scene());
             if (binding.sampler) descriptor.sampler = &static_cast<const CpuSampler*>(binding.sampler)->state;

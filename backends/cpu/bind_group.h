@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "backends/cpu/checks/checked_memory.h"
 #include "backends/cpu/compiler/compiler.h"
 #include "backends/cpu/shader_interface.h"
 #include "rhi/backend.h"
@@ -39,6 +40,7 @@ std::vector<BindingSlots> slots_of(std::span<rhi::BackendBindGroupLayout* const>
 class CpuBindGroup : public rhi::BackendBindGroup {
   public:
     std::vector<Descriptor> descriptors;
+    CheckedObjects checked;  ///< What lies behind each descriptor; empty on devices without checks.
 
     static Expected<std::unique_ptr<rhi::BackendBindGroup>> create(rhi::BackendBindGroupLayout& layout,
                                                                    std::span<const rhi::BackendBinding> bindings,

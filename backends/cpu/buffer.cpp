@@ -3,10 +3,12 @@
 
 #include <fmt/format.h>
 
+#include "backends/cpu/checks/check_functions.h"
+
 namespace nacre::cpu {
 
 Expected<std::unique_ptr<rhi::BackendBuffer>> CpuBuffer::create(const std::shared_ptr<HostMemory>& memory,
-                                                                const rhi::BufferDesc& desc) {
+                                                                const rhi::BufferDesc& desc, std::uint32_t checks) {
     auto buffer = std::make_unique<CpuBuffer>();
     buffer->block_ = MemoryBlock(memory, desc.size);
     if (!buffer->block_.data())
@@ -29,6 +31,14 @@ Expected<std::unique_ptr<rhi::BackendBuffer>> CpuBuffer::create(const std::share
     buffer->desc = desc;
     if (desc.memory != rhi::MemoryKind::device) buffer->mapped = buffer->block_.data();
     buffer->memory_bytes = desc.size;
+    if (checks & (check_sanitize | check_hostile)) {
+        const bool is_device = desc.memory == rhi::MemoryKind::device;
+        // What the host writes into mapped memory is not seen: all of it counts as written.
+        buffer->checked = std::make_unique<CheckedMemory>(fmt::format("buffer '{}'", desc.name), buffer->data(), desc.size, !is_device);
+        if (is_device || checks & check_hostile) poison(buffer->data(), desc.size);
+    } else if (checks) {
+        buffer->checked = std::make_unique<CheckedMemory>(fmt::format("buffer '{}'", desc.name), buffer->data(), desc.size, true);
+    }
     return buffer;
 }
 

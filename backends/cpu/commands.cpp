@@ -30,7 +30,7 @@ bool is_executed(CommandType type) {
 
 }  // namespace
 
-FlatPlan flatten(const rhi::ExecutionPlan& plan) {
+FlatPlan flatten(const rhi::ExecutionPlan& plan, bool for_checks) {
     FlatPlan flat;
     flat.serial = plan.serial;
     std::size_t total = 0;
@@ -39,30 +39,43 @@ FlatPlan flatten(const rhi::ExecutionPlan& plan) {
         for (const auto& block : stream->blocks) total += block.used;
     }
     flat.words.reserve(total / 8);
+    flat.host_buffers.assign(plan.host_buffers.begin(), plan.host_buffers.end());
     for (rhi::CommandStream* stream : plan.streams) {
         const CommandHeader begin{static_cast<CommandType>(begin_list_command), 0, sizeof(CommandHeader)};
         append(flat, &begin, sizeof begin);
+        if (for_checks) flat.lists.push_back({stream->name, stream->strings});
         stream->for_each([&](const CommandHeader& header, const std::byte*) {
-            if (is_executed(header.type)) append(flat, &header, header.bytes);
+            if (!for_checks && !is_executed(header.type)) return;
+            for (const rhi::UnstatedUse& use : plan.unstated)
+                if (use.statement == &header)
+                    flat.unstated.push_back({flat.words.size(), static_cast<CpuBuffer*>(use.buffer),
+                                             static_cast<CpuTexture*>(use.texture), use.stated, use.found});
+            append(flat, &header, header.bytes);
         });
     }
     return flat;
 }
 
-Executor::Executor(Scheduler& scheduler, Watchdog& watchdog, std::uint32_t lanes)
+Executor::Executor(Scheduler& scheduler, Watchdog& watchdog, std::uint32_t lanes, const ExecutorChecks& checks)
     : scheduler_(scheduler),
       watchdog_(watchdog),
       transfer_(scheduler),
-      rasterizer_(scheduler, lanes),
+      rasterizer_(scheduler, lanes,
+                  {.tile_order = checks.flags & check_hostile ? std::optional(checks.seed) : std::nullopt}),
+      checks_(checks),
       workgroup_memory_(scheduler.thread_count()),
       scratch_(std::make_shared<HostMemory>(machine_memory_bytes())) {
     reset_state();
 }
 
 std::string Executor::execute(const FlatPlan& plan) {
+    plan_ = &plan;
+    list_ = 0;
     for (std::size_t at = 0; at < plan.words.size() && stopped_.empty();) {
         const auto& header = *reinterpret_cast<const CommandHeader*>(plan.words.data() + at);
-        execute(header, reinterpret_cast<const std::byte*>(&header) + sizeof(CommandHeader));
+        const std::byte* payload = reinterpret_cast<const std::byte*>(&header) + sizeof(CommandHeader);
+        execute(header, payload);
+        if (checks_.flags) note_transfer(header, payload);
         at += header.bytes / 8;
     }
     if (in_pass_) {
@@ -71,6 +84,10 @@ std::string Executor::execute(const FlatPlan& plan) {
         in_pass_ = false;
     }
     reset_state();
+    end_statement();
+    forget_checks();
+    if (checks_.log) checks_.log->send();
+    plan_ = nullptr;
     return stopped_;
 }
 
@@ -91,6 +108,7 @@ void Executor::execute(const CommandHeader& header, const std::byte* payload) {
         return *static_cast<CpuQueryPool*>(command.pool.object);
     };
 #define NACRE_COMMAND(type) as(std::type_identity<rhi::type>{})
+    if (checks_.flags) note_name(header, payload);
     if (static_cast<std::uint16_t>(header.type) == begin_list_command) return reset_state();
     switch (header.type) {
         case CommandType::begin_render_pass: return begin_render_pass(NACRE_COMMAND(BeginRenderPassCommand));
@@ -169,10 +187,10 @@ void Executor::execute(const CommandHeader& header, const std::byte* payload) {
             return begin_occlusion_query(pool_of(command), command.index);
         }
         case CommandType::end_occlusion_query: return end_occlusion_query();
+        case CommandType::begin_statement: return begin_statement(header, payload);
+        case CommandType::end_statement: return end_statement();
         case CommandType::push_debug_group:
-        case CommandType::pop_debug_group:
-        case CommandType::begin_statement:
-        case CommandType::end_statement: return;
+        case CommandType::pop_debug_group: return;
     }
 #undef NACRE_COMMAND
 }

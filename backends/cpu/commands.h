@@ -2,12 +2,14 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <deque>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "backends/cpu/bind_group.h"
+#include "backends/cpu/checks/check_functions.h"
 #include "backends/cpu/pipeline.h"
 #include "backends/cpu/query_pool.h"
 #include "backends/cpu/transfer.h"
@@ -24,15 +26,38 @@ struct FlatPlan {
     /// Commands as in rhi::CommandStream, in one piece; `begin_list_command` begins each list.
     std::vector<std::uint64_t> words;
     std::uint64_t serial = 0;
+    /// For checks: names of the lists and of what is in them.
+    struct ListNames {
+        std::string name;
+        std::vector<std::string> strings;
+    };
+    std::vector<ListNames> lists;
+    /// Uses that a statement does not name (see rhi::UnstatedUse).
+    struct Unstated {
+        std::size_t statement = 0;  ///< Where the command that begins it lies in `words`.
+        CpuBuffer* buffer = nullptr;
+        CpuTexture* texture = nullptr;
+        rhi::ResourceUse stated{}, found{};
+    };
+    std::vector<Unstated> unstated;
+    std::vector<const rhi::BackendBuffer*> host_buffers;  ///< In use that the host can map.
 };
 inline constexpr std::uint16_t begin_list_command = 0xffff;
 
-FlatPlan flatten(const rhi::ExecutionPlan& plan);
+/// @param for_checks  with names, and with the commands that only names and checks need
+FlatPlan flatten(const rhi::ExecutionPlan& plan, bool for_checks = false);
+
+/// What is looked for while commands are executed.
+struct ExecutorChecks {
+    std::uint32_t flags = 0;  ///< CheckFlags
+    std::uint32_t seed = 0;
+    FaultLog* log = nullptr;  ///< Set where flags are.
+};
 
 /// Executes plans; queue thread only.
 class Executor {
   public:
-    Executor(Scheduler& scheduler, Watchdog& watchdog, std::uint32_t lanes);
+    Executor(Scheduler& scheduler, Watchdog& watchdog, std::uint32_t lanes, const ExecutorChecks& checks = {});
 
     /// Returns an empty text, or why the device must be given up. May throw std::bad_alloc.
     std::string execute(const FlatPlan& plan);
@@ -63,6 +88,22 @@ class Executor {
     void dispatch(rhi::DispatchArguments groups);
     void dispatch_indirect(const rhi::DispatchIndirectCommand& command);
     void set_push_constants(const rhi::SetPushConstantsCommand& command);
+
+    // Checks (command_checks.cpp).
+    /// What the shaders of a dispatch or draw are told; lives until `forget_checks`.
+    const CommandChecks* make_checks(const char* what, std::uint32_t number);
+    void begin_scope() { ++scope_, forget_checks(); }
+    void forget_checks() { command_checks_.clear(); }
+    void note_name(const rhi::CommandHeader& header, const std::byte* payload);
+    /// Content that a command outside of render passes has defined.
+    void note_transfer(const rhi::CommandHeader& header, const std::byte* payload);
+    void note_pass_begin(const rhi::BeginRenderPassCommand& command);
+    void note_pass_end();
+    void prepare_workgroup_checks();
+    /// What a statement does not name is kept from its commands: nothing makes them wait for it, so in the worst order they
+    /// find undefined content, and what they write is overwritten.
+    void begin_statement(const rhi::CommandHeader& header, const std::byte* payload);
+    void end_statement();
 
     /// Notes which shader ran when the watchdog's limit passed.
     void look_at_watchdog(const std::string& shader);
@@ -112,6 +153,32 @@ class Executor {
     ShaderTrace* trace_ = nullptr;
     std::string traced_shader_;
     Compiler* compiler_ = nullptr;
+    const ExecutorChecks checks_;
+    const FlatPlan* plan_ = nullptr;
+    std::size_t list_ = 0;  ///< Lists that have begun.
+    std::uint32_t draws_ = 0, dispatches_ = 0;  ///< Of the list.
+    std::string pass_name_;
+    std::vector<std::string> debug_groups_;
+    std::uint32_t scope_ = 0;
+    std::atomic<std::uint64_t> batches_{0};
+    std::deque<CommandChecks> command_checks_;
+    std::vector<std::unique_ptr<CheckedMemory>> workgroup_checks_;
+    std::vector<CheckedMemory*> workgroup_check_pointers_;
+    struct Attachment {
+        ImageView view{};
+        CheckedMemory* checked = nullptr;
+        bool is_depth = false, is_discarded = false, is_stencil_discarded = false;
+    };
+    std::vector<Attachment> attachments_;  ///< Of the open pass, where there are checks.
+    /// Content that is kept from the commands of the open statement.
+    struct Withheld {
+        CheckedMemory* memory = nullptr;
+        std::vector<std::byte> content;
+        std::vector<std::uint64_t> undefined;
+        bool is_poisoned = false, keeps_writes = false;
+    };
+    std::vector<Withheld> withheld_;
+
     std::vector<MemoryBlock> workgroup_memory_;  ///< One for each thread.
     std::shared_ptr<HostMemory> scratch_;
 };

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 
 #include "backends/cpu/device.h"
@@ -17,12 +18,19 @@ constexpr std::array<rhi::Backend::Mode, 4> all_modes{{
     {"double", "the reference: every float is a double, in registers and in memory"},
 }};
 
+constexpr std::array<rhi::Backend::Mode, 3> all_checks{{
+    {"traps", "the first number that is none or infinite, division by zero or index out of range stops the device"},
+    {"sanitize", "uninitialized reads, indices out of range, data races, divided quads and births of NaN are reported"},
+    {"hostile", "undefined contents are poison, orders are the worst allowed; hostile=N for another order"},
+}};
+
 constexpr std::uint32_t most_threads = 1024;
 
 class CpuBackend : public rhi::Backend {
   public:
     [[nodiscard]] std::string_view name() const override { return "cpu"; }
     [[nodiscard]] std::span<const Mode> modes() const override { return all_modes; }
+    [[nodiscard]] std::span<const Mode> checks() const override { return all_checks; }
     [[nodiscard]] bool accepts_lanes() const override { return true; }
     [[nodiscard]] bool accepts_threads() const override { return true; }
 
@@ -50,6 +58,10 @@ class CpuBackend : public rhi::Backend {
                                                  : ExecutionMode::fast;
         options.lanes = spec.lanes != 0 ? spec.lanes : native_lanes();
         options.threads = spec.threads;
+        const auto looks_for = [&](std::string_view check) { return std::ranges::find(spec.checks, check) != spec.checks.end(); };
+        options.checks = (looks_for("traps") ? check_traps : 0u) | (looks_for("sanitize") ? check_sanitize : 0u) |
+                         (looks_for("hostile") ? check_hostile : 0u);
+        options.seed = spec.seed;
         return CpuDevice::create(options, desc);
     }
 };

@@ -60,10 +60,12 @@ CpuDevice::CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc&
       capabilities_(find_capabilities(options.mode == ExecutionMode::consistent ? max_lanes : options.lanes)),
       faults_(desc.desc->faults),
       memory_(std::make_shared<HostMemory>(machine_memory_bytes(), desc.desc->faults.fail_allocation)),
+      checks_(options.checks),
+      faults_seen_(desc.report),
       compiler_(std::move(compiler)),
       scheduler_(Scheduler::create(options.threads)),
       watchdog_(watchdog_limit()),
-      executor_(*scheduler_, watchdog_, options.lanes) {
+      executor_(*scheduler_, watchdog_, options.lanes, {options.checks, options.seed, &faults_seen_}) {
     // Shadows take up to 8 times what they belong to, but only where shaders write does the system give them pages.
     if (options.mode != ExecutionMode::double_precision) return;
     capabilities_.float_bits = 53;
@@ -74,7 +76,7 @@ CpuDevice::CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc&
 
 Expected<std::unique_ptr<rhi::BackendDevice>> CpuDevice::create(const DeviceOptions& options,
                                                                 const rhi::BackendDeviceDesc& desc) try {
-    NACRE_TRY(auto compiler, Compiler::create({.lanes = options.lanes, .mode = options.mode}));
+    NACRE_TRY(auto compiler, Compiler::create({.lanes = options.lanes, .mode = options.mode, .checks = options.checks}));
     std::unique_ptr<CpuDevice> device(new CpuDevice(options, desc, std::move(compiler)));
     if (log_is_on(LogLevel::debug))
         log_message(LogLevel::debug,
@@ -108,11 +110,11 @@ void CpuDevice::lose(const std::string& reason) {
 
 Expected<std::unique_ptr<rhi::BackendBuffer>> CpuDevice::create_buffer(const rhi::BufferDesc& desc) {
     NACRE_CHECK(check_lost("create buffer"));
-    return CpuBuffer::create(memory_, desc);
+    return CpuBuffer::create(memory_, desc, checks_);
 }
 Expected<std::unique_ptr<rhi::BackendTexture>> CpuDevice::create_texture(const rhi::TextureDesc& desc) {
     NACRE_CHECK(check_lost("create texture"));
-    return CpuTexture::create(memory_, desc);
+    return CpuTexture::create(memory_, desc, checks_);
 }
 Expected<std::unique_ptr<rhi::BackendSampler>> CpuDevice::create_sampler(const rhi::SamplerDesc& desc) {
     NACRE_CHECK(check_lost("create sampler"));
@@ -171,8 +173,40 @@ Expected<std::unique_ptr<rhi::BackendAccelerationStructure>> CpuDevice::create_a
 }
 
 // Host and device share all memory.
-Expected<void> CpuDevice::flush_mapped(rhi::BackendBuffer&) { return check_lost("unmap buffer"); }
-Expected<void> CpuDevice::invalidate_mapped(rhi::BackendBuffer&) { return check_lost("map buffer"); }
+Expected<void> CpuDevice::flush_mapped(rhi::BackendBuffer& buffer) {
+    if (is_hostile()) check_host_access("unmap buffer", buffer);
+    return check_lost("unmap buffer");
+}
+Expected<void> CpuDevice::invalidate_mapped(rhi::BackendBuffer& buffer) {
+    if (is_hostile()) check_host_access("map buffer", buffer);
+    return check_lost("map buffer");
+}
+
+void CpuDevice::check_host_access(const char* attempted, const rhi::BackendBuffer& buffer) {
+    std::uint64_t serial = 0;
+    {
+        const std::scoped_lock lock(mutex_);
+        for (const FlatPlan& plan : waiting_)
+            if (std::ranges::find(plan.host_buffers, &buffer) != plan.host_buffers.end()) serial = plan.serial;
+    }
+    if (serial == 0) return;
+    faults_seen_.add(rhi::ShaderFault::host_access, nullptr, attempted + buffer.desc.name, 1, false, [&] {
+        FoundFault fault;
+        fault.attempted = attempted;
+        fault.subject = fmt::format("'{}'", buffer.desc.name);
+        fault.reason = fmt::format("expected submission {}, which uses it, to be waited for, found that nobody did", serial);
+        return fault;
+    });
+    faults_seen_.send();
+}
+
+void CpuDevice::release(std::uint64_t serial) {
+    const std::scoped_lock lock(mutex_);
+    while (!waiting_.empty() && waiting_.front().serial <= serial) {
+        queue_.post([this, flat = std::move(waiting_.front())] { run_plan(flat); });
+        waiting_.pop_front();
+    }
+}
 
 Expected<void> CpuDevice::execute(const rhi::ExecutionPlan& plan) try {
     NACRE_CHECK(check_lost("submit"));
@@ -181,7 +215,20 @@ Expected<void> CpuDevice::execute(const rhi::ExecutionPlan& plan) try {
         lose("planted by FaultInjection::lose_device");
     }
     NACRE_CHECK(check_lost("submit"));
-    queue_.post([this, flat = flatten(plan)] { run_plan(flat); });
+    if (!is_hostile()) {
+        queue_.post([this, flat = flatten(plan, checks_ != 0)] { run_plan(flat); });
+        return {};
+    }
+    // A program that never waits must not pile up work without end.
+    constexpr std::size_t most_waiting = 8;
+    std::uint64_t released = 0;
+    {
+        const std::scoped_lock lock(mutex_);
+        waiting_.push_back(flatten(plan, true));
+        questions_ = 0;
+        if (waiting_.size() > most_waiting) released = waiting_.front().serial;
+    }
+    release(released);
     return {};
 } catch (const std::bad_alloc&) {
     return fail(ErrorCode::out_of_memory, "submit", adapter_.name, "there is no memory for the commands",
@@ -206,9 +253,22 @@ void CpuDevice::run_plan(const FlatPlan& plan) {
     changed_.notify_all();
 }
 
-std::uint64_t CpuDevice::completed_serial() { return completed_; }
+std::uint64_t CpuDevice::completed_serial() {
+    if (is_hostile()) {
+        // Who asks again and again waits in his own way.
+        constexpr std::uint32_t most_questions = 64;
+        std::uint64_t released = 0;
+        {
+            const std::scoped_lock lock(mutex_);
+            if (++questions_ >= most_questions && !waiting_.empty()) released = waiting_.front().serial;
+        }
+        release(released);
+    }
+    return completed_;
+}
 
 Expected<void> CpuDevice::wait(std::uint64_t serial, std::chrono::nanoseconds timeout) {
+    if (is_hostile()) release(serial);
     std::unique_lock lock(mutex_);
     const auto finished = [&] { return completed_ >= serial || lost_; };
     // A time point at the end of time would overflow inside wait_for.

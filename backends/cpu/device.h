@@ -3,11 +3,13 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <set>
 #include <string>
 
+#include "backends/cpu/checks/fault_log.h"
 #include "backends/cpu/commands.h"
 #include "backends/cpu/compiler/compiler.h"
 #include "backends/cpu/queue.h"
@@ -19,6 +21,8 @@ struct DeviceOptions {
     ExecutionMode mode = ExecutionMode::fast;
     std::uint32_t lanes = 16;   ///< 4, 8 or 16.
     std::uint32_t threads = 0;  ///< 0: one for each core.
+    std::uint32_t checks = 0;   ///< CheckFlags
+    std::uint32_t seed = 0;     ///< Of hostile orders.
 };
 
 /// This machine as an adapter.
@@ -32,6 +36,7 @@ class CpuDevice : public rhi::BackendDevice {
 
     [[nodiscard]] const rhi::AdapterInfo& adapter() const override { return adapter_; }
     [[nodiscard]] const rhi::Capabilities& capabilities() const override { return capabilities_; }
+    [[nodiscard]] bool wants_uses() const override { return is_hostile(); }
 
     Expected<std::unique_ptr<rhi::BackendBuffer>> create_buffer(const rhi::BufferDesc& desc) override;
     Expected<std::unique_ptr<rhi::BackendTexture>> create_texture(const rhi::TextureDesc& desc) override;
@@ -72,11 +77,22 @@ class CpuDevice : public rhi::BackendDevice {
     void lose(const std::string& reason);
     void run_plan(const FlatPlan& plan);
 
+    // Hostile order: work is done as late as is allowed, so that who does not wait for it does not find it done.
+    [[nodiscard]] bool is_hostile() const { return (checks_ & check_hostile) != 0; }
+    /// Hands the plans up to a serial to the queue.
+    void release(std::uint64_t serial);
+    /// Reports that the host uses a buffer which a plan that waits uses too.
+    void check_host_access(const char* attempted, const rhi::BackendBuffer& buffer);
+    std::deque<FlatPlan> waiting_;       // Under mutex_.
+    std::uint32_t questions_ = 0;        // Under mutex_: for completion, since the last plan.
+
     ExecutionMode mode_;
     rhi::AdapterInfo adapter_;
     rhi::Capabilities capabilities_;
     rhi::FaultInjection faults_;
     std::shared_ptr<HostMemory> memory_;
+    const std::uint32_t checks_;
+    FaultLog faults_seen_;
     std::unique_ptr<Compiler> compiler_;
     std::shared_ptr<RayDevice> rays_;  ///< Made when the first acceleration structure is.
     std::unique_ptr<Scheduler> scheduler_;

@@ -45,6 +45,7 @@ void Executor::begin_render_pass(const rhi::BeginRenderPassCommand& command) {
     pass_shaders_.clear();
     occlusion_ = nullptr;
     in_pass_ = true;
+    if (checks_.flags) note_pass_begin(command);
     rasterizer_.begin_pass(targets_);
 }
 
@@ -58,6 +59,7 @@ void Executor::end_render_pass() {
     if (!stopped_.empty()) return;
     for (const Resolve& resolve : resolves_)
         transfer_.resolve(targets_.colors[resolve.color], resolve.destination, targets_.width, targets_.height);
+    if (checks_.flags) note_pass_end();
     reset_state();
 }
 

@@ -17,6 +17,7 @@ namespace nacre::cpu {
 struct ImageView;
 struct SamplerState;
 struct ShaderTrace;
+class CommandChecks;
 
 inline constexpr std::uint32_t max_lanes = 16;
 inline constexpr std::uint32_t max_quads = max_lanes / 4;
@@ -53,6 +54,7 @@ struct ShaderContext {
     const std::byte* push_constants;        ///< `push_constant_capacity` bytes, aligned to 16.
     ExecutionState* state;
     ShaderTrace* trace;  ///< Of programs that are traced.
+    const CommandChecks* checks;            ///< For code that looks for faults (checks/check_interface.h); else null.
 };
 
 // ---- Compute -------------------------------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
+#include <numeric>
 #include <optional>
 
 #include "backends/cpu/capabilities.h"
@@ -29,6 +30,23 @@ std::optional<Arguments> read_arguments(const rhi::BufferReference& reference, s
 std::uint64_t share(std::uint64_t total, std::uint64_t part, std::uint64_t parts) {
     return total / parts * part + total % parts * part / parts;
 }
+
+/// Puts the numbers below a total into another order, always the same for one seed.
+class Shuffle {
+  public:
+    Shuffle(std::uint64_t total, std::uint32_t seed) : total_(total) {
+        if (total >> 32) return;  // Backwards is order enough, and products stay in range.
+        // Steps of about a golden part of the whole, which have no factor in common with it: neighbors come far apart.
+        step_ = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(static_cast<double>(total) * 0.6180339887) + seed) % total;
+        while (std::gcd(step_, total) != 1) ++step_;
+    }
+    std::uint64_t operator()(std::uint64_t index) const {
+        return total_ - 1 - index * step_ % total_;
+    }
+
+  private:
+    std::uint64_t total_, step_ = 1;
+};
 
 }  // namespace
 
@@ -69,6 +87,8 @@ bool Executor::is_traced(const std::string& name) const {
 
 void Executor::look_at_watchdog(const std::string& shader) {
     if (!stopped_.empty() || !watchdog_.has_expired()) return;
+    if (checks_.log) stopped_ = checks_.log->stop();
+    if (!stopped_.empty()) return;
     const double seconds = std::chrono::duration<double>(watchdog_.limit()).count();
     stopped_ = fmt::format("shader {} ran for longer than {} s and was stopped (NACRE_CPU_WATCHDOG_SECONDS)",
                            shader.empty() ? "of an empty pass" : shader, seconds);
@@ -81,6 +101,7 @@ void Executor::draw(const DrawCall& call, std::uint32_t draw_index) {
     if (is_traced(state.pipeline->fragment.name))
         if (const RasterPipeline* traced = pipeline_->traced(*compiler_)) state.pipeline = traced;
     state.context = make_context();
+    if (checks_.flags) state.context.checks = make_checks("draw", ++draws_);
     for (std::size_t i = 0; i < vertex_buffers_.size(); ++i) {
         const VertexBuffer& bound = vertex_buffers_[i];
         const std::uint64_t size = bound.buffer ? bound.buffer->size_from(bound.offset) : 0;
@@ -168,7 +189,15 @@ void Executor::dispatch(rhi::DispatchArguments groups) {
         memory = MemoryBlock(scratch_, std::max<std::uint64_t>(program.workgroup_bytes, 64));
         if (!memory.data()) throw std::bad_alloc();
     }
-    const ShaderContext context = make_context();
+    ShaderContext context = make_context();
+    if (checks_.flags) {
+        begin_scope();
+        prepare_workgroup_checks();
+        context.checks = make_checks("dispatch", ++dispatches_);
+    }
+    // Hostile order: workgroups one by one, in an order that nobody can rely on.
+    const bool is_shuffled = (checks_.flags & check_hostile) != 0;
+    const Shuffle shuffle(total, checks_.seed);
     // Enough parts that threads finish together; neighbors stay together for the sake of caches.
     constexpr std::uint64_t parts_for_each_thread = 32;
     const auto parts =
@@ -181,11 +210,13 @@ void Executor::dispatch(rhi::DispatchArguments groups) {
             constexpr std::uint64_t most_at_once = 1024;
             for (std::uint64_t at = share(total, part, parts); at < end && !watchdog_.has_expired();) {
                 WorkgroupRange range{};
-                range.x_begin = static_cast<std::uint32_t>(at % groups.x);
-                const std::uint64_t count = std::min({end - at, std::uint64_t{groups.x} - range.x_begin, most_at_once});
+                const std::uint64_t first = is_shuffled ? shuffle(at) : at;
+                range.x_begin = static_cast<std::uint32_t>(first % groups.x);
+                const std::uint64_t count =
+                    is_shuffled ? 1 : std::min({end - at, std::uint64_t{groups.x} - range.x_begin, most_at_once});
                 range.x_end = range.x_begin + static_cast<std::uint32_t>(count);
-                range.y = static_cast<std::uint32_t>(at / groups.x % groups.y);
-                range.z = static_cast<std::uint32_t>(at / groups.x / groups.y);
+                range.y = static_cast<std::uint32_t>(first / groups.x % groups.y);
+                range.z = static_cast<std::uint32_t>(first / groups.x / groups.y);
                 range.count[0] = groups.x, range.count[1] = groups.y, range.count[2] = groups.z;
                 range.memory = workgroup_memory_[thread].data();
                 program.run(&context, &range);

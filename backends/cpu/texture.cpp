@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "backends/cpu/images/double_texels.h"
+#include "backends/cpu/checks/check_functions.h"
 
 namespace nacre::cpu {
 namespace {
@@ -51,7 +52,7 @@ bool is_written_by_shaders(rhi::TextureUsage usage) {
 std::uint32_t stored_texel_bytes(rhi::Format format) { return rhi::info(format).block_bytes; }
 
 Expected<std::unique_ptr<rhi::BackendTexture>> CpuTexture::create(const std::shared_ptr<HostMemory>& memory,
-                                                                  const rhi::TextureDesc& desc) {
+                                                                  const rhi::TextureDesc& desc, std::uint32_t checks) {
     const rhi::FormatInfo& facts = rhi::info(desc.format);
     if (desc.mips > max_mips)
         return fail(ErrorCode::unsupported, "create texture", fmt::format("'{}'", desc.name),
@@ -94,6 +95,11 @@ Expected<std::unique_ptr<rhi::BackendTexture>> CpuTexture::create(const std::sha
             whole.levels[mip].shadow = doubles + offsets[mip] / whole.texel_bytes * doubles_of_texel;
     }
     texture->memory_bytes = bytes;
+    if (checks) {
+        const bool is_poisoned = (checks & (check_sanitize | check_hostile)) != 0;
+        texture->checked = std::make_unique<CheckedMemory>(fmt::format("texture '{}'", desc.name), data, bytes, !is_poisoned);
+        if (is_poisoned) poison(data, bytes);
+    }
     return texture;
 }
 

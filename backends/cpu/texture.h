@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 
+#include "backends/cpu/checks/checked_memory.h"
 #include "backends/cpu/host_memory.h"
 #include "backends/cpu/image_view.h"
 #include "rhi/backend.h"
@@ -19,7 +20,7 @@ std::uint32_t stored_texel_bytes(rhi::Format format);
 class CpuTexture : public rhi::BackendTexture {
   public:
     static Expected<std::unique_ptr<rhi::BackendTexture>> create(const std::shared_ptr<HostMemory>& memory,
-                                                                 const rhi::TextureDesc& desc);
+                                                                 const rhi::TextureDesc& desc, std::uint32_t checks = 0);
 
     /// A part of the texture in the view's own format and dimension.
     [[nodiscard]] ImageView make_view(const rhi::ViewReference& reference) const;
@@ -28,6 +29,9 @@ class CpuTexture : public rhi::BackendTexture {
 
     /// All mips, layers and samples.
     [[nodiscard]] const ImageView& whole() const { return whole_; }
+
+    /// What is known of the content besides it; null on devices without checks.
+    std::unique_ptr<CheckedMemory> checked;
 
   private:
     struct ViewKey {

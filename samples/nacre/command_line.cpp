@@ -196,8 +196,8 @@ void add_scene(CLI::App& app, SceneArguments& arguments, bool is_required = true
 void add_backend(CLI::App& app, SceneArguments& arguments) {
     app.add_option_function<std::string>(
            "-b,--backend", [&](const std::string& text) { arguments.backends = {text}; },
-           fmt::format("Where to render: NAME[:MODE][:lanes=N][:threads=N], NAME being auto (the first that works: cpu) or "
-                       "one of {}",
+           fmt::format("Where to render: NAME[:MODE][:CHECK][:lanes=N][:threads=N], NAME being auto (the first that works: "
+                       "cpu) or one of {}; checks of cpu are traps, sanitize and hostile[=N]",
                        join(backend_names())))
         ->type_name("BACKEND")
         ->group("Device");
@@ -323,8 +323,8 @@ struct Definition {
         command
             ->add_option_function<std::string>(
                 "-b,--backends", [this](const std::string& list) { compare.scene.backends = split_backends(list); },
-                fmt::format("Two or more of {}, separated by commas, each as NAME[:MODE][:lanes=N][:threads=N]; the "
-                            "first is the reference",
+                fmt::format("Two or more of {}, separated by commas, each as NAME[:MODE][:CHECK][:lanes=N][:threads=N]; "
+                            "the first is the reference",
                             join(backend_names())))
             ->type_name("LIST")
             ->required()

@@ -157,13 +157,15 @@ TEST(Device, ListIsUsedUpBySubmission) {
 }
 
 TEST(BackendSpec, ReadsWhatItWrites) {
-    for (const char* text : {"vulkan", "gl:osmesa", "cpu:double:lanes=8:threads=2", "cpu:threads=3"}) {
+    for (const char* text : {"vulkan", "gl:osmesa", "cpu:double:lanes=8:threads=2", "cpu:threads=3",
+                             "cpu:consistent:sanitize:hostile=7:lanes=4", "cpu:hostile:threads=1"}) {
         const auto spec = BackendSpec::parse(text);
         ASSERT_TRUE(spec) << spec.error().message();
         EXPECT_EQ(spec->text(), text);
     }
     for (const char* text : {"", ":", "gl:", "GL", "gl:lanes=0", "gl:lanes=x", "gl:lanes=4:lanes=4", "gl:speed=1",
-                             "gl:lanes=4:osmesa", "gl:lanes=99999999999"})
+                             "gl:lanes=4:osmesa", "gl:lanes=99999999999", "cpu:traps:traps", "cpu:fast:traps:traps",
+                             "cpu:hostile=0", "cpu:hostile=7:hostile=8"})
         EXPECT_FALSE(BackendSpec::parse(text)) << text;
 }
 

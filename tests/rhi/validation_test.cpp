@@ -93,6 +93,13 @@ std::string document() {
         "| code | meaning |\n|---|---|\n";
     for (const ValidationRule& rule : validation_rules())
         text += "| `" + std::string(rule.code) + "` | " + std::string(rule.meaning) + " |\n";
+    text +=
+        "\n## What shaders do while they run\n\n"
+        "Found by backends that are asked to look for it ([cpu.md](cpu.md), \"Fault finders\"); the source of these "
+        "messages is\n`MessageSource::shader`.\n\n"
+        "| code | meaning |\n|---|---|\n";
+    for (const ValidationRule& fault : shader_faults())
+        text += "| `" + std::string(fault.code) + "` | " + std::string(fault.meaning) + " |\n";
     return text;
 }
 

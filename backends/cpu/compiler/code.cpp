@@ -32,6 +32,7 @@
 #include <mutex>
 
 #include "backends/cpu/images/double_operations.h"
+#include "backends/cpu/checks/check_functions.h"
 #include "backends/cpu/images/image_operations.h"
 #include "backends/cpu/rays/ray_query.h"
 #include "backends/cpu/shader_interface.h"
@@ -207,6 +208,11 @@ class OrcGenerator final : public CodeGenerator {
         };
         define("nacre_cpu_image", image_function(lanes_));
         define("nacre_cpu_double_image", double_image_function());
+        define("nacre_cpu_check_begin", check_begin_function());
+        define("nacre_cpu_check_workgroup", check_workgroup_function());
+        define("nacre_cpu_check_fault", check_fault_function());
+        define("nacre_cpu_check_memory", check_memory_function());
+        define("nacre_cpu_check_image", check_image_function());
         define("nacre_cpu_ray_proceed", ray_proceed_function());
         define("nacre_cpu_ray_confirm", ray_confirm_function());
         define("nacre_cpu_ray_generate", ray_generate_function());

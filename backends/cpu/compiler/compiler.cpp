@@ -120,7 +120,9 @@ class ShaderCompilation final : public Compiler {
     Expected<std::shared_ptr<CompiledCode>> compile(const Variant& how, const ShaderSource& source, spv::ExecutionModel model,
                                                     const VertexInput& input, std::vector<NarrowedOperation>& narrowed,
                                                     Emit&& emit) {
-        NACRE_TRY(const std::vector<std::uint32_t> words, legalize(source.spirv, source.specialization, source.name));
+        NACRE_TRY(const std::vector<std::uint32_t> words, legalize(source.spirv, source.specialization, source.name,
+                                                                    {.keeps_variables = (how.options.checks & check_sanitize) != 0,
+                                                                     .inlines_all = how.options.checks != 0 || source.trace}));
         NACRE_TRY(const Module module, Module::parse(words, source.entry_point, model, source.name));
         llvm::LLVMContext context;
         auto target = std::make_unique<llvm::Module>("shader", context);
@@ -168,8 +170,8 @@ class ShaderCompilation final : public Compiler {
 
     Hash128 key_of(const Variant& how, std::span<const std::uint32_t> words, const ShaderSource& source, spv::ExecutionModel model,
                    const VertexInput& input) const {
-        std::string text = fmt::format("{} {} {} {} {} {} {}\n", nacre_cpu_compiler_sources, how.options.lanes, static_cast<int>(how.options.mode),
-                                       static_cast<int>(model), source.entry_point, how.generator->fingerprint(), words.size());
+        std::string text = fmt::format("{} {} {} {} {} {} {} {}\n", nacre_cpu_compiler_sources, how.options.lanes, static_cast<int>(how.options.mode),
+                                       how.options.checks, static_cast<int>(model), source.entry_point, how.generator->fingerprint(), words.size());
         for (const BindingSlots& slot : source.slots) text += fmt::format("s{} {} {} {}\n", slot.set, slot.binding, slot.first, slot.count);
         for (const rhi::VertexAttribute& at : input.attributes)
             text += fmt::format("a{} {} {} {}\n", at.location, at.buffer, at.offset, static_cast<int>(at.format));

@@ -33,6 +33,7 @@ struct CompilerOptions {
     std::uint32_t lanes = 16;  ///< 4, 8 or 16.
     ExecutionMode mode = ExecutionMode::fast;
     bool use_disk_cache = true;
+    std::uint32_t checks = 0;  ///< CheckFlags: faults that the code looks for while it runs.
 };
 
 /// Where the descriptors of a binding lie in their group: `first` for element 0.

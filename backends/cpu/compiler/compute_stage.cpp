@@ -18,6 +18,7 @@ bool ComputeEmitter::waits_for_workgroup(const Instruction& barrier) const {
 bool ComputeEmitter::emit_stage(const Instruction& at) {
     switch (at.op) {
         case Op::OpControlBarrier: {
+            if (options.checks) check_barrier();
             if (!has_barriers || !waits_for_workgroup(at)) return true;
             // All subgroups of the workgroup come to this point before the first of them goes on.
             llvm::Value* state = builder.CreateIntrinsic(llvm::Intrinsic::coro_suspend, {}, {llvm::ConstantTokenNone::get(context), builder.getFalse()});
@@ -66,6 +67,7 @@ std::vector<Component> ComputeEmitter::input_components(const Variable& variable
 
 void ComputeEmitter::emit_subgroup_body(llvm::Value* subgroup) {
     subgroup_index = subgroup;
+    if (options.checks) begin_checks(rhi::ShaderStage::compute, range, group_x, subgroup);
     const auto& size = module.workgroup_size;
     const std::uint32_t total = size[0] * size[1] * size[2];
     const Component index = linear(builder.CreateMul(subgroup, int32(lanes)), 1);
@@ -143,6 +145,7 @@ void ComputeEmitter::emit_plain_kernel() {
     llvm::PHINode* x = builder.CreatePHI(builder.getInt32Ty(), 2, "x");
     x->addIncoming(begin, start);
     group_x = x;
+    if (follows_undefined()) check_workgroup(shader_context, memory);
     builder.CreateBr(body);
     builder.SetInsertPoint(body);
     llvm::PHINode* subgroup = builder.CreatePHI(builder.getInt32Ty(), 2, "subgroup");
@@ -244,6 +247,9 @@ void ComputeEmitter::emit_suspending_kernel() {
     builder.SetInsertPoint(group_loop);
     llvm::PHINode* x = builder.CreatePHI(word, 2);
     x->addIncoming(x_begin, entry);
+    if (follows_undefined())
+        check_workgroup(kernel_context,
+                        builder.CreateLoad(pointer_type, at_offset(kernel_range, offsetof(WorkgroupRange, memory))));
     builder.CreateBr(launch);
     builder.SetInsertPoint(launch);
     llvm::PHINode* index = builder.CreatePHI(word, 2);

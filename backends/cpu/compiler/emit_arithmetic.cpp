@@ -47,6 +47,7 @@ bool Emitter::emit_arithmetic(const Instruction& at) {
     if (!at.result || !at.type) return false;
     std::vector<Component> result = evaluate(at.op, at.type, at.operands, at.result);
     if (result.empty()) return false;
+    if (follows_undefined()) refine_undefined(at.op, at.operands, result);
     set(at, std::move(result));
     return true;
 }

@@ -88,6 +88,7 @@ bool Emitter::emit_atomic(const Instruction& at) {
     if (is_narrowed && value) value = to_single(value);
 
     if (pointer.kind == Pointer::Kind::texel) {
+        image_root = pointer.root;
         if (is_negated) value = apply({value}, [&](auto v) { return builder.CreateNeg(v[0]); });
         if (is_load || is_store) {
             // Through the same path as a plain access: texels of atomics are 32 bits, which are read and written whole.
@@ -109,6 +110,10 @@ bool Emitter::emit_atomic(const Instruction& at) {
     if (pointer.kind != Pointer::Kind::bytes) reject("an atomic operation on memory that is not shared");
     if (pointer.storage != spv::StorageClass::Workgroup && !is_load) has_side_effects = true;
 
+    if (options.checks) check_range(pointer);
+    if (follows_undefined())
+        check_memory(pointer, 0, scalar,
+                     access_atomic | (is_load ? 0u : std::uint32_t{access_write}) | (is_store ? 0u : std::uint32_t{access_read}), nullptr);
     const Component ok = allowed(pointer, 0, scalar.bits / 8);
     llvm::Value* lanes_on = both(is_load ? mask : effect_mask(), ok ? ok.value : nullptr);
     llvm::Value* address = addresses(pointer, 0);

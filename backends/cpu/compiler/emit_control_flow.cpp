@@ -417,10 +417,13 @@ void Emitter::emit_block(std::uint32_t index, llvm::Value* block_mask) {
     }
     for (const Instruction& at : block.body) {
         current = &at;
+        if (options.checks) check_operands(at);
         emit_instruction(at);
         current = &at;
+        if (options.checks) check_result(at);
     }
     current = &block.terminator;
+    if (options.checks) check_operands(block.terminator);
     emit_terminator(index);
     current = nullptr;
 }

@@ -124,6 +124,7 @@ std::vector<Component> Emitter::image_call(const Component& image, const Compone
             builder.CreateStore(llvm::Constant::getNullValue(vector_of(builder.getInt32Ty())), gathered.back());
         }
     std::vector<Component> values;
+    std::vector<llvm::Value*> read_undefined;
     for_each_different(image, lanes_on, [&](llvm::Value* one_image, llvm::Value* image_mask) {
         for_each_different(
             sampler ? sampler : Component(one_image), image_mask,
@@ -132,6 +133,9 @@ std::vector<Component> Emitter::image_call(const Component& image, const Compone
                 llvm::Value* state =
                     sampler ? invariant_load(pointer_type, at_offset(one_sampler, offsetof(Descriptor, sampler)), 8)
                             : llvm::ConstantPointerNull::get(pointer_type);
+                llvm::Value* undefined =
+                    options.checks ? check_image(one_image, one_sampler, flags, both_mask) : nullptr;
+                if (undefined) read_undefined.push_back(undefined);
                 builder.CreateCall(function, {view, state, image_memory(), int32(static_cast<std::int32_t>(flags)),
                                               mask_bits(both_mask)});
                 for (std::size_t i = 0; i < results; ++i) {
@@ -153,6 +157,8 @@ std::vector<Component> Emitter::image_call(const Component& image, const Compone
     if (is_split)
         for (llvm::AllocaInst* slot : gathered)
             values.emplace_back(builder.CreateLoad(vector_of(builder.getInt32Ty()), slot));
+    else if (!read_undefined.empty())
+        for (Component& value : values) value.undefined = read_undefined.front();
     return values;
 }
 
@@ -255,6 +261,7 @@ bool Emitter::emit_image(const Instruction& at) {
             const Value image = get(at.operand(0)), sampler = get(at.operand(1));
             Value& value = define(at.result);
             value.image = image.image, value.sampler = sampler.sampler, value.image_type = image.image_type;
+            value.image_root = image.image_root;
             finish_definition(at.result);
             return true;
         }
@@ -270,6 +277,7 @@ bool Emitter::emit_image(const Instruction& at) {
             made->kind = Pointer::Kind::texel;
             made->storage = spv::StorageClass::Image;
             made->image_descriptor = descriptor(image);
+            made->root = image.root;
             made->image_type = image.type;
             made->coordinates = get(at.operand(1)).components;
             made->sample = get_scalar(at.operand(2));
@@ -307,6 +315,7 @@ bool Emitter::emit_image(const Instruction& at) {
     }
     if (is_compared) first_operand = 3;
     const Value image = get(at.operand(0));
+    image_root = image.image_root;
     const Type& type = module.type(image.image_type);
     if (type.dim == spv::Dim::Buffer || type.dim == spv::Dim::SubpassData)
         reject("texel buffers and subpass inputs are not supported");
@@ -399,7 +408,8 @@ bool Emitter::emit_image(const Instruction& at) {
         return image_call(image.image, needs_sampler ? image.sampler : Component(), image.image_type, coordinates,
                           flags, texel, sample);
     };
-    const bool may_be_words = operation == ImageOperation::fetch && image.image.is_uniform() && level.is_uniform() &&
+    if (is_implicit && has_quads && looks_for(check_sanitize)) check_quads();
+    const bool may_be_words = !options.checks && operation == ImageOperation::fetch && image.image.is_uniform() && level.is_uniform() &&
                               !more.offset && !type.multisampled && type.dim != spv::Dim::Cube &&
                               level.value->getType()->isIntegerTy(32) &&
                               coordinates.at(0).value->getType()->getScalarType()->isIntegerTy(32);

@@ -43,6 +43,14 @@ LaneVariable& Emitter::make_lane_variable(Id variable_id, Id type_id, bool is_un
         if (stack_bytes > most_stack_bytes && !is_on_heap())
             reject(fmt::format("the variables take {} bytes of stack for {} lanes; {} is the most", stack_bytes, lanes, most_stack_bytes));
         made->memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::max<std::uint64_t>(bytes, 1)), "variable");
+        if (follows_undefined()) {
+            made->undefined = std::make_unique<LaneVariable>();
+            made->undefined->type = type_id;
+            made->undefined->is_uniform = is_uniform;
+            made->undefined->memory = make_slot(
+                llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * 4 * (is_uniform ? 1 : lanes)),
+                "undefined");
+        }
     }
     return *made;
 }
@@ -85,6 +93,8 @@ Pointer Emitter::pointer_to(Id id) {
     Pointer pointer;
     pointer.storage = variable.storage;
     pointer.type = variable.type;
+    pointer.root = id;
+    if (options.checks) pointer.path = name_of(id);
     if (is_ray_query(variable.type)) return ray_query_pointer(id);
     switch (variable.storage) {
         case StorageClass::Function:
@@ -156,6 +166,7 @@ Component Emitter::descriptor(const Pointer& pointer) {
         llvm::Value* size = load_context(offsetof(ShaderContext, group_sizes) + pointer.set * 4, builder.getInt32Ty());
         count = builder.CreateSub(size, int32(slot->first));
     }
+    if (options.checks) check_index(index, Component(count), pointer.path);
     llvm::Value* first = at_offset(group, std::int64_t{slot->first} * static_cast<std::int64_t>(sizeof(Descriptor)));
     if (index.is_uniform()) {
         llvm::Value* wide = builder.CreateZExt(index.value, builder.getInt64Ty());
@@ -171,6 +182,7 @@ Pointer Emitter::buffer_pointer(const Pointer& block) {
     Pointer pointer = block;
     pointer.kind = Pointer::Kind::bytes;
     const Component address = descriptor(block);
+    pointer.descriptor_address = address;
     if (address.is_uniform()) {
         pointer.base = invariant_load(pointer_type, at_offset(address.value, offsetof(Descriptor, data)), 8);
         if (in_double())
@@ -229,6 +241,7 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
     if (type.kind == TypeKind::structure) {
         const std::uint32_t number = fixed.value_or(0);
         const Member& member = type.members.at(number);
+        if (options.checks) pointer.path = member_path(pointer, number);
         if (pointer.kind == Pointer::Kind::lanes) {
             pointer.component += member.first_component;
         } else {
@@ -267,6 +280,7 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
     if (fixed && !is_unbounded) {
         if (*fixed >= count) {
             pointer.valid = builder.getFalse();
+            if (options.checks) pointer.indices.push_back({int32(*fixed), int32(count)});
             return pointer;
         }
         if (pointer.kind == Pointer::Kind::lanes) pointer.component += static_cast<std::uint32_t>(*fixed * step);
@@ -295,6 +309,10 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
             llvm::Type* kind = like(v[0], builder.getInt32Ty());
             return builder.CreateTrunc(builder.CreateUDiv(room, llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(std::max<std::int64_t>(step, 1)))), kind);
         });
+    }
+    if (options.checks) {
+        pointer.indices.push_back({index, bound});
+        check_undefined(std::span(&index, 1), origin_of(index_id));
     }
     const Component in_range = apply({index, bound}, [&](auto v) { return builder.CreateICmpULT(v[0], v[1]); });
     pointer.valid = logical_and(pointer.valid, in_range);
@@ -590,19 +608,26 @@ void Emitter::visit_layout(const Pointer& pointer, Id type_id, std::int64_t extr
 
 std::vector<Component> Emitter::load(const Pointer& pointer) {
     std::vector<Component> values;
+    if (options.checks) check_range(pointer);
     if (module.type(pointer.type).components > most_direct_components * 16)
         reject(fmt::format("a value of {} scalars is loaded at once", module.type(pointer.type).components));
     if (pointer.kind == Pointer::Kind::lanes) {
         std::uint32_t index = 0;
-        for_each_component_type(pointer.type, [&](const Type& scalar) { values.push_back(load_lane_component(pointer, index++, scalar)); });
+        for_each_component_type(pointer.type, [&](const Type& scalar) {
+            values.push_back(load_lane_component(pointer, index, scalar));
+            if (pointer.variable->undefined)
+                values.back().undefined = load_lane_component(undefined_of(pointer), index, boolean_type()).value;
+            ++index;
+        });
     } else if (pointer.kind == Pointer::Kind::bytes) {
-        // With doubles each word has a shadow, and speed does not matter.
-        if (!in_double()) {
+        // Each word has a shadow of doubles or of what is undefined, and speed does not matter.
+        if (!in_double() && !follows_undefined()) {
             if (auto rows = load_rows(pointer)) return std::move(*rows);
             if (auto equal = load_where_equal(pointer)) return std::move(*equal);
         }
         visit_layout(pointer, pointer.type, 0, [&](const Pointer& at, std::int64_t extra, const Type& scalar) {
             values.push_back(load_bytes(at, extra, scalar));
+            if (follows_undefined()) note_read(at, extra, scalar, values.back());
         });
     } else {
         reject("a resource is loaded as a value");
@@ -612,14 +637,20 @@ std::vector<Component> Emitter::load(const Pointer& pointer) {
 
 void Emitter::store(const Pointer& pointer, const std::vector<Component>& values) {
     std::size_t index = 0;
+    if (options.checks) check_range(pointer), note_store(pointer);
     if (pointer.kind == Pointer::Kind::lanes) {
         for_each_component_type(pointer.type, [&](const Type& scalar) {
-            store_lane_component(pointer, static_cast<std::uint32_t>(index), scalar, values.at(index));
+            const auto number = static_cast<std::uint32_t>(index);
+            store_lane_component(pointer, number, scalar, values.at(index));
+            if (llvm::Value* undefined = values[index].undefined; pointer.variable->undefined)
+                store_lane_component(undefined_of(pointer), number, boolean_type(),
+                                     Component(undefined ? undefined : builder.getFalse()));
             ++index;
         });
     } else if (pointer.kind == Pointer::Kind::bytes) {
-        if (!in_double() && store_rows(pointer, values)) return;
+        if (!in_double() && !follows_undefined() && store_rows(pointer, values)) return;
         visit_layout(pointer, pointer.type, 0, [&](const Pointer& at, std::int64_t extra, const Type& scalar) {
+            if (follows_undefined()) note_write(at, extra, scalar, values.at(index));
             store_bytes(at, extra, scalar, values.at(index++));
         });
     } else {
@@ -668,8 +699,9 @@ void Emitter::declare_variables() {
         std::vector<Component> initial;
         if (variable.initializer) initial = get_components(variable.initializer);
         else if (module.type(variable.type).components <= most_direct_components)
-            for_each_component_type(variable.type, [&](const Type& scalar) { initial.push_back(zero(scalar)); });
+            for_each_component_type(variable.type, [&](const Type& scalar) { initial.push_back(undefined_value(scalar)); });
         fill(made, initial);
+        if (made.undefined) mark_undefined(made, !variable.initializer);
     }
     share_environment();
 }
@@ -690,9 +722,10 @@ bool Emitter::emit_memory(const Instruction& at) {
             } else if (const Type& type = module.type(variable.type); type.components <= 64) {
                 // In loops and repeated calls: not what an earlier round left there.
                 std::vector<Component> initial;
-                for_each_component_type(variable.type, [&](const Type& scalar) { initial.push_back(zero(scalar)); });
-                fill(variable, initial);
+                for_each_component_type(variable.type, [&](const Type& scalar) { initial.push_back(undefined_value(scalar)); });
+                if (!follows_undefined() || frame->function == &module.entry()) fill(variable, initial);
             }
+            if (!at.operand(1) && variable.undefined) mark_undefined(variable);
             return true;
         }
         case Op::OpAccessChain:
@@ -714,6 +747,7 @@ bool Emitter::emit_memory(const Instruction& at) {
                 const Component address = descriptor(from);
                 Value& value = define(at.result);
                 value.image = address, value.sampler = address;
+                value.image_root = from.root;
                 value.image_type = type.kind == TypeKind::sampled_image ? type.element : at.type;
                 finish_definition(at.result);
                 return true;

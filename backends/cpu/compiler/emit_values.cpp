@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <llvm/IR/Constants.h>
 
+#include "backends/cpu/checks/check_functions.h"
 #include "backends/cpu/compiler/emitter.h"
 
 namespace nacre::cpu {
@@ -11,6 +12,18 @@ namespace nacre::cpu {
 using spv::Op;
 
 Component Emitter::zero(const Type& scalar) { return llvm::Constant::getNullValue(scalar_type(scalar)); }
+
+Component Emitter::undefined_value(const Type& scalar) {
+    Component value = zero(scalar);
+    if (looks_for(check_hostile) && scalar.kind != TypeKind::boolean) {
+        const llvm::APInt bits(scalar.bits, poison_word(0) * 0x100000001ull);
+        value = scalar.kind == TypeKind::floating
+                    ? llvm::ConstantFP::get(context, llvm::APFloat(value.value->getType()->getFltSemantics(), bits))
+                    : static_cast<llvm::Value*>(llvm::ConstantInt::get(context, bits));
+    }
+    if (follows_undefined()) value.undefined = builder.getTrue();
+    return value;
+}
 
 Value Emitter::constant(Id id) {
     if (const auto found = constants_.find(id); found != constants_.end()) return found->second;
@@ -59,7 +72,9 @@ Value Emitter::constant(Id id) {
         case Op::OpUndef:
         case Op::OpConstantNull:
         default:
-            for_each_component_type(at.type, [&](const Type& scalar) { value.components.push_back(zero(scalar)); });
+            for_each_component_type(at.type, [&](const Type& scalar) {
+                value.components.push_back(at.op == Op::OpUndef ? undefined_value(scalar) : zero(scalar));
+            });
     }
     constants_.emplace(id, value);
     return value;
@@ -127,7 +142,11 @@ void Emitter::set(const Instruction& at, std::vector<Component> components) {
     // What the analysis holds for uniform is kept as a scalar, so that slots and branches can rely on it.
     if (!uniformity.is_divergent(at.result))
         for (Component& component : components)
-            if (!component.is_uniform()) component = Component(narrow(component, mask));
+            if (!component.is_uniform()) {
+                llvm::Value* undefined = component.undefined;
+                component = Component(narrow(component, mask));
+                component.undefined = undefined ? any(both(mask, undefined)) : nullptr;
+            }
     trace_result(at, components);
     define(at.result).components = std::move(components);
     finish_definition(at.result);
@@ -150,6 +169,10 @@ void Emitter::finish_definition(Id id) {
     const auto keep = [&](Component& component) {
         for (llvm::Value** place : {&component.value, &component.linear_base})
             if (*place) frame->changes.push_back({place, nullptr, nullptr, use->second.last});
+        if (component.undefined) {
+            llvm::Value* nothing = llvm::Constant::getNullValue(component.undefined->getType());
+            frame->changes.push_back({&component.undefined, nullptr, nothing, use->second.last});
+        }
     };
     for (Component& component : value.components) keep(component);
     keep(value.image), keep(value.sampler);

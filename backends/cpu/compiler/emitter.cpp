@@ -146,7 +146,9 @@ Component Emitter::apply(std::span<const Component> arguments,
     std::vector<llvm::Value*> values;
     values.reserve(arguments.size());
     for (const Component& argument : arguments) values.push_back(is_uniform ? argument.value : widen(argument));
-    return function(values);
+    Component result = function(values);
+    if (follows_undefined()) spread_undefined(result, arguments);
+    return result;
 }
 
 Component Emitter::linear(llvm::Value* base, std::int64_t stride) {

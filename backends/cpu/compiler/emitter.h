@@ -13,11 +13,13 @@
 #include <unordered_set>
 #include <vector>
 
+#include "backends/cpu/checks/check_interface.h"
 #include "backends/cpu/compiler/compiler.h"
 #include "backends/cpu/compiler/math/math.h"
 #include "backends/cpu/compiler/module.h"
 #include "backends/cpu/compiler/uniformity.h"
 #include "backends/cpu/trace.h"
+#include "rhi/validation.h"
 
 /// @file
 /// From SPIR-V to LLVM IR that runs `lanes` invocations at once.
@@ -39,6 +41,8 @@ struct Component {
     /// Where the lanes rise evenly: value of lane i is linear_base + i * linear_stride (modulo 2^32).
     llvm::Value* linear_base = nullptr;
     std::int64_t linear_stride = 0;
+    /// Lanes whose value depends on something that nothing has written: i1, or a vector of it. Null: none, or nobody asks.
+    llvm::Value* undefined = nullptr;
 
     Component() = default;
     Component(llvm::Value* only) : value(only) {}  // NOLINT: a component is its value.
@@ -54,6 +58,7 @@ struct LaneVariable {
     std::uint32_t slot_bytes = 4;        ///< Of one lane of one scalar.
     llvm::Value* memory = nullptr;       ///< Null for inputs that nothing indexes dynamically.
     std::vector<Component> components;   ///< Inputs: the values themselves.
+    std::unique_ptr<LaneVariable> undefined;  ///< Booleans: which scalars nothing has written. Null: nobody asks.
 };
 
 /// What a pointer points to.
@@ -63,6 +68,15 @@ struct Pointer {
     Id type = 0;                     ///< Of what it points to.
     /// False in lanes whose indices were out of range; null: always true.
     Component valid;
+
+    // For checks alone.
+    Id root = 0;                     ///< The variable that it leads into.
+    std::string path;                ///< "lights.color"
+    struct Index {
+        Component index, bound;      ///< i32; inside where the index is below the bound.
+    };
+    std::vector<Index> indices;      ///< On the way from the variable.
+    Component descriptor_address;    ///< Of a buffer.
 
     // Kind::lanes
     LaneVariable* variable = nullptr;
@@ -102,6 +116,7 @@ struct Value {
     Id image_type = 0;
     /// Pointers that depend on control flow: one of those that they may be, for the layout of matrices.
     std::shared_ptr<const Pointer> origin;
+    Id image_root = 0;               ///< The variable of the image.
 };
 
 /// What went wrong, thrown inside of the emitter only and turned into an Error at its surface.
@@ -214,6 +229,7 @@ class Emitter {
     std::vector<Component> get_components(Id id);        ///< Of pointers too.
     Value constant(Id id);
     Component zero(const Type& scalar);
+    Component undefined_value(const Type& scalar);  ///< Of something that was never written.
     void set(const Instruction& at, std::vector<Component> components);
     void finish_definition(Id id);
 
@@ -310,6 +326,50 @@ class Emitter {
     /// Runs `body` for each lane of `mask` in turn.
     void for_each_lane(llvm::Value* mask, const std::function<void(llvm::Value* lane)>& body);
 
+    // ---- Checks (emit_checks.cpp): nothing of this is emitted but where the options ask for it.
+    [[nodiscard]] bool looks_for(std::uint32_t checks) const { return (options.checks & checks) != 0; }
+    /// Whether undefined values are followed to where something depends on them.
+    [[nodiscard]] bool follows_undefined() const { return looks_for(check_sanitize | check_hostile); }
+    /// Where the invocations begin: what they are is kept for reports. `group_x` and `subgroup` may be null.
+    void begin_checks(rhi::ShaderStage stage, llvm::Value* work, llvm::Value* group_x, llvm::Value* subgroup);
+    void check_operands(const Instruction& at);
+    void check_result(const Instruction& at);
+    /// Indices on the way of a pointer, and the whole value that it leads to.
+    void check_range(const Pointer& pointer);
+    void check_index(const Component& index, const Component& bound, const std::string& object, const Pointer* pointer = nullptr);
+    void check_undefined(std::span<const Component> components, const std::string& object);
+    /// Every quad in which some but not all lanes run.
+    void check_quads();
+    /// Takes note of an access to a scalar, by MemoryAccess; returns the lanes that read what is undefined, null: none can.
+    llvm::Value* check_memory(const Pointer& pointer, std::int64_t extra, const Type& scalar, std::uint32_t access,
+                              llvm::Value* undefined);
+    /// The same for the image operation whose arguments are in place.
+    llvm::Value* check_image(llvm::Value* image, llvm::Value* sampler, std::uint32_t flags, llvm::Value* lanes_on);
+    void check_barrier();
+    /// A workgroup begins: nothing has written its memory.
+    void check_workgroup(llvm::Value* kernel_context, llvm::Value* memory);
+    void check_outputs(const Variable& variable, std::span<const Component> values);
+    /// Components of one value are undefined where an argument is.
+    void spread_undefined(Component& result, std::span<const Component> arguments);
+    /// The same for operations whose result may not depend on all of their arguments.
+    void refine_undefined(spv::Op op, std::span<const std::uint32_t> operands, std::vector<Component>& result);
+    void mark_undefined(LaneVariable& variable, bool is_undefined = true);
+    [[nodiscard]] static Pointer undefined_of(const Pointer& pointer);  ///< To the variable's `undefined`.
+    [[nodiscard]] static const Type& boolean_type();
+    [[nodiscard]] std::string member_path(const Pointer& structure, std::uint32_t member);
+    void note_store(const Pointer& pointer);
+    void note_read(const Pointer& pointer, std::int64_t extra, const Type& scalar, Component& value);
+    void note_write(const Pointer& pointer, std::int64_t extra, const Type& scalar, const Component& value);
+    [[nodiscard]] std::string name_of(Id variable) const;
+    /// The variable that a value was read from, as far as that can be told.
+    [[nodiscard]] std::string origin_of(Id value) const;
+    struct CheckNotes;
+    CheckNotes& notes();
+    llvm::Value* check_site(const std::string& object, std::int32_t set, std::int32_t binding);
+    void check_fault(rhi::ShaderFault kind, llvm::Value* bad, const std::string& object, const Component& found = {},
+                     const Component& limit = {}, const Pointer* pointer = nullptr);
+    std::shared_ptr<CheckNotes> check_notes;
+
     // ---- Elements of neighboring lanes side by side (emit_rows.cpp)
     /// How the elements that a pointer means lie in memory, in words of 32 bits.
     struct RowLayout {
@@ -369,6 +429,7 @@ class Emitter {
     llvm::Value* killed_slot = nullptr;        ///< ptr to lanes that ended inside of functions; null: none can.
     llvm::AllocaInst* nowhere_slot = nullptr;  ///< Where stores go that must vanish.
     llvm::AllocaInst* image_arguments = nullptr;
+    Id image_root = 0;                         ///< Variable of the image that `image_call` is called for.
     std::unordered_map<Id, std::unique_ptr<LaneVariable>> lane_variables;
     std::unordered_map<Id, std::uint64_t> workgroup_offsets;
     std::unordered_map<Id, llvm::Value*> ray_queries;

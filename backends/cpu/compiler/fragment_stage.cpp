@@ -334,6 +334,7 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
         }
         default: return false;
     }
+    if (looks_for(check_sanitize)) check_quads();
     std::vector<Component> made;
     for (const Component& value : get(at.operand(0)).components) {
         if (!both_ways) {
@@ -360,6 +361,7 @@ void FragmentEmitter::store_outputs() {
         const Variable* variable = module.variable(id);
         if (!variable || variable->storage != spv::StorageClass::Output) continue;
         const std::vector<Component> values = load(pointer_to(id));
+        if (options.checks) check_outputs(*variable, values);
         if (variable->builtin) {
             const auto put = [&](std::size_t offset) {
                 builder.CreateAlignedStore(widen(to_word(values.at(0))), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
@@ -459,6 +461,7 @@ void FragmentEmitter::emit_batch() {
         begin_trace(
             builder.CreateAnd(live(), builder.CreateAnd(is_at(corner_x, step_x, 0), is_at(corner_y, step_y, 1))), {});
     }
+    if (options.checks) begin_checks(rhi::ShaderStage::fragment, batch, nullptr, nullptr);
     declare_variables();
     emit_function(module.entry(), {}, all_lanes());
     mask = all_lanes();

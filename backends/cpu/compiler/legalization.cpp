@@ -98,11 +98,11 @@ class InliningPlan {
     /// Basic blocks in it, about.
     [[nodiscard]] std::uint64_t blocks() const { return own_blocks_ * instructions_ / std::max<std::uint64_t>(own_instructions_, 1); }
 
-    void apply(std::vector<std::uint32_t>& words) const {
+    void apply(std::vector<std::uint32_t>& words, bool inlines_all) const {
         constexpr auto dont_inline = static_cast<std::uint32_t>(spv::FunctionControlMask::DontInline);
         for (const auto& [id, function] : functions_) {
             if (!function.control) continue;
-            if (function.is_kept) words[function.control] |= dont_inline;
+            if (function.is_kept && !inlines_all) words[function.control] |= dont_inline;
             else words[function.control] &= ~dont_inline;
         }
     }
@@ -158,7 +158,8 @@ class InliningPlan {
 }  // namespace
 
 Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> words,
-                                              std::span<const rhi::SpecializationConstant> specialization, std::string_view name) {
+                                              std::span<const rhi::SpecializationConstant> specialization, std::string_view name,
+                                              const LegalizationOptions& options) {
     const std::uint32_t version = words.size() > 1 ? words[1] : 0x10300;
     const spv_target_env environment = version <= 0x10300   ? SPV_ENV_VULKAN_1_1
                                        : version == 0x10400 ? SPV_ENV_VULKAN_1_1_SPIRV_1_4
@@ -196,24 +197,25 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
                     fmt::format("with its calls replaced by what they call the shader has {} instructions", plan.instructions()),
                     "Call functions with barriers less often, or use another backend.");
     std::vector<std::uint32_t> planned(words.begin(), words.end());
-    plan.apply(planned);
+    plan.apply(planned, options.inlines_all);
     optimizer.RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
         .RegisterPass(spvtools::CreateInlineExhaustivePass())
         .RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
         .RegisterPass(spvtools::CreatePrivateToLocalPass());
-    if (!plan.has_variable_pointers())
+    if (!plan.has_variable_pointers() && !options.keeps_variables)
         optimizer.RegisterPass(spvtools::CreateScalarReplacementPass(100))
             .RegisterPass(spvtools::CreateLocalAccessChainConvertPass())
             // Access chains that nothing uses any more would keep variables from becoming values.
             .RegisterPass(spvtools::CreateAggressiveDCEPass(true))
             .RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass())
             .RegisterPass(spvtools::CreateLocalSingleStoreElimPass());
-    if (plan.blocks() <= most_rewritten_blocks && !plan.has_variable_pointers()) optimizer.RegisterPass(spvtools::CreateSSARewritePass());
+    if (plan.blocks() <= most_rewritten_blocks && !plan.has_variable_pointers() && !options.keeps_variables)
+        optimizer.RegisterPass(spvtools::CreateSSARewritePass());
     optimizer.RegisterPass(spvtools::CreateAggressiveDCEPass(true));
-    spvtools::OptimizerOptions options;
-    options.set_run_validator(false);
+    spvtools::OptimizerOptions optimizer_options;
+    optimizer_options.set_run_validator(false);
     std::vector<std::uint32_t> result;
-    if (!optimizer.Run(planned.data(), planned.size(), &result, options)) {
+    if (!optimizer.Run(planned.data(), planned.size(), &result, optimizer_options)) {
         // Simpler is better, not needed; only specialization constants must be frozen.
         if (!has_specialization) return planned;
         return fail(ErrorCode::shader_compile, "compile shader", fmt::format("'{}'", name), "the module cannot be specialized: " + log,

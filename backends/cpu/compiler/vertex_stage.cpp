@@ -257,6 +257,7 @@ void VertexEmitter::emit_batch() {
     live_slot = make_slot(mask_type, "live");
     store_live(builder.CreateICmpULT(lane_numbers(), splat(count)));
     mask = all_lanes();
+    if (options.checks) begin_checks(rhi::ShaderStage::vertex, batch, nullptr, nullptr);
     declare_variables();
     emit_function(module.entry(), {}, all_lanes());
     mask = all_lanes();

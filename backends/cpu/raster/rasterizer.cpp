@@ -2,6 +2,7 @@
 #include "backends/cpu/raster/rasterizer.h"
 
 #include <algorithm>
+#include <random>
 
 #include "backends/cpu/raster/draw_plan.h"
 
@@ -163,6 +164,7 @@ struct Rasterizer::State {
         busy_tiles.clear();
         for (std::uint32_t tile = 0; tile < tile_count; ++tile)
             if (all_tiles || tile_marks[tile] || (clears && uncleared[tile])) busy_tiles.push_back(tile);
+        if (options.tile_order) std::ranges::shuffle(busy_tiles, std::minstd_rand(*options.tile_order + 1));
 
         std::size_t primitive_bytes = sizeof(PrimitiveData);
         plans.clear();

@@ -71,10 +71,11 @@ struct DrawCall {
 /// gl_PointSize is kept between 1 and this.
 inline constexpr float largest_point_size = 255.0f;
 
-/// For tests; the results are the same whatever is chosen.
+/// For tests and hostile order; the results are the same whatever is chosen.
 struct RasterizerOptions {
     std::uint32_t instruction_set = 2;  ///< At most: 0 the baseline of the processor family, 1 AVX2, 2 AVX-512.
     bool hierarchical_depth = true;
+    std::optional<std::uint32_t> tile_order;  ///< Seed: tiles are drawn in another order, one for each seed.
 };
 
 /// Carries out the draws of render passes, one after another, on the threads of a scheduler. Not thread-safe.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <mutex>
+#include <utility>
 
 #include <fmt/format.h>
 #include <spirv-tools/optimizer.hpp>
@@ -47,8 +49,9 @@ bool may_be_fused(std::uint32_t op) {
 
 }  // namespace
 
-Expected<std::vector<std::uint32_t>> compile(const std::string& text, Stage stage) {
-    static ShaderCompiler compiler({.debug_information = false});
+Expected<std::vector<std::uint32_t>> compile(const std::string& text, Stage stage, bool with_lines) {
+    static ShaderCompiler plain({.debug_information = false}), debuggable({});
+    ShaderCompiler& compiler = with_lines ? debuggable : plain;
     const char* path = stage == Stage::compute ? "generated.comp" : stage == Stage::fragment ? "generated.frag" : "generated.vert";
     NACRE_TRY(const ShaderDesc desc, compiler.compile({.path = path, .text = text}));
     const std::vector<std::uint32_t>& words = desc.spirv;
@@ -85,6 +88,9 @@ std::string Output::place_of(std::size_t word, Stage stage) {
 }
 
 struct DeviceRunner::Objects {
+    // Before the device, which may have something to say until its end.
+    std::mutex messages_mutex;
+    std::vector<std::string> messages;
     Instance instance{all_backends()};
     std::unique_ptr<Device> device;
     Buffer input, numbers, reals, result, items, counters, pairs, attributes;
@@ -97,10 +103,19 @@ struct DeviceRunner::Objects {
 DeviceRunner::DeviceRunner(std::unique_ptr<Objects> objects) : objects_(std::move(objects)) {}
 DeviceRunner::~DeviceRunner() = default;
 
+std::vector<std::string> DeviceRunner::take_messages() {
+    const std::scoped_lock lock(objects_->messages_mutex);
+    return std::exchange(objects_->messages, {});
+}
+
 Expected<std::unique_ptr<DeviceRunner>> DeviceRunner::create(const std::string& spec) {
     auto made = std::make_unique<Objects>();
     NACRE_TRY(made->device, made->instance.create_device({.backend = spec, .validation = false, .debug_names = false, .name = "differential"}));
     Device& device = *made->device;
+    device.set_message_callback([objects = made.get()](const Message& message) {
+        const std::scoped_lock lock(objects->messages_mutex);
+        objects->messages.push_back(message.text);
+    });
     Random random(4711);
     std::vector<std::uint32_t> input(256);
     for (std::uint32_t& word : input) {

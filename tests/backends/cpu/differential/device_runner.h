@@ -21,7 +21,8 @@ struct Output {
 };
 
 /// SPIR-V of a generated text, in which no multiplication and addition may be fused: without that, bits are the device's choice.
-Expected<std::vector<std::uint32_t>> compile(const std::string& text, Stage stage);
+/// @param with_lines  with names and line tables
+Expected<std::vector<std::uint32_t>> compile(const std::string& text, Stage stage, bool with_lines = false);
 /// The same module as the performance passes of SPIRV-Tools leave it.
 std::vector<std::uint32_t> optimized(const std::vector<std::uint32_t>& words);
 
@@ -31,6 +32,8 @@ class DeviceRunner {
     /// @param spec  of the backend: "cpu:fast:lanes=8"
     static Expected<std::unique_ptr<DeviceRunner>> create(const std::string& spec);
     Expected<Output> run(const std::vector<std::uint32_t>& words, Stage stage);
+    /// What the device has said since the last call.
+    std::vector<std::string> take_messages();
     ~DeviceRunner();
 
   private:
