@@ -76,7 +76,6 @@ struct Pointer {
         Component index, bound;      ///< i32; inside where the index is below the bound.
     };
     std::vector<Index> indices;      ///< On the way from the variable.
-    Component descriptor_address;    ///< Of a buffer.
 
     // Kind::lanes
     LaneVariable* variable = nullptr;
@@ -99,7 +98,7 @@ struct Pointer {
     // Kind::descriptor: one element or an array of them.
     std::uint32_t set = 0, binding = 0;
     Component descriptor_index;      ///< i32; null: 0.
-    Component descriptor_address;    ///< ptr, instead of set, binding and index: what a function was given.
+    Component descriptor_address;    ///< ptr, instead of set, binding and index: what a function was given; of bytes: that of their buffer.
 
     // Kind::texel
     Component image_descriptor;
