@@ -23,12 +23,12 @@ set(public_headers
   rhi/acceleration_structure.h rhi/backend.h rhi/capabilities.h rhi/command_list.h rhi/command_stream.h rhi/device.h
   rhi/format.h rhi/handle.h
   rhi/pipeline.h rhi/pipeline_reloader.h rhi/reflection.h rhi/resources.h rhi/shader_compiler.h rhi/texture_table.h
-  rhi/validation.h
+  rhi/trace.h rhi/validation.h
   materials/description.h materials/single_slab.h
   scene/builtin.h scene/environment.h scene/load.h scene/scene.h scene/shapes.h scene/tangents.h
   passes/frame_graph.h passes/gbuffer_layout.h passes/plan.h passes/profiles.h passes/renderer.h
   measure/comparison_page.h measure/cross_backend.h measure/flip.h measure/frame_times.h measure/image_metrics.h
-  measure/report_page.h measure/texel_decoding.h measure/texture_comparison.h measure/tolerance.h)
+  measure/numerical_error.h measure/report_page.h measure/texel_decoding.h measure/texture_comparison.h measure/tolerance.h)
 foreach(header IN LISTS public_headers)
   get_filename_component(folder "${header}" DIRECTORY)
   install(FILES "${CMAKE_SOURCE_DIR}/${header}" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/nacre/${folder}")

@@ -35,7 +35,9 @@ TEST(CpuClean, RandomShadersGiveNoReport) {
             const auto expected = (*plain)->run(*words, shader.stage);
             const auto found = (*checked)->run(*words, shader.stage);
             ASSERT_TRUE(found) << found.error().message();
-            if (expected) EXPECT_EQ(found->words, expected->words);
+            if (expected) {
+                EXPECT_EQ(found->words, expected->words);
+            }
             const std::vector<std::string> messages = (*checked)->take_messages();
             for (const std::string& message : messages) ADD_FAILURE() << message;
             reported += !messages.empty();

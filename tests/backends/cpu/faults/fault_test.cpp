@@ -202,8 +202,9 @@ TEST_P(Planted, IsReported) {
         const std::vector<rhi::Message> messages = bench.messages();
         // What comes of a hostile order may be seen at several places.
         const bool is_hostile = std::string(fault.checks).find("hostile") != std::string::npos;
-        if (!is_hostile)
+        if (!is_hostile) {
             ASSERT_EQ(messages.size(), 1u) << (messages.size() > 1 ? messages[0].text + "\n" + messages[1].text : "");
+        }
         const auto found = std::ranges::find_if(
             messages, [&](const rhi::Message& candidate) { return candidate.code.starts_with(fault.code); });
         ASSERT_NE(found, messages.end()) << (messages.empty() ? "" : messages[0].text);
