@@ -96,6 +96,8 @@ class World {
         auto made = instance.create_device({.backend = spec, .driver_validation = true});
         if (!made) {
             absent_ = made.error().message();
+            // A driver that is here and fails is a failure.
+            if (made.error().code != ErrorCode::not_found) ADD_FAILURE() << absent_;
             return;
         }
         device_ = std::move(*made);
