@@ -1,6 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef NACRE_CLOSURES_CLOSURE
 #define NACRE_CLOSURES_CLOSURE
+#include "materials/closures/diffuse.glsl"
+#include "materials/closures/fresnel.glsl"
+#include "materials/closures/ggx.glsl"
+#include "materials/closures/slab.glsl"
+#include "materials/closures/tables.glsl"
+#ifdef NACRE_SLAB_FUZZ
+#include "materials/closures/fuzz.glsl"
+#endif
 // A slab seen from one direction: everything that depends on slab and view is computed once, lights follow.
 //
 // All vectors are unit and in the local frame: z is the normal, x the tangent, y the bitangent; they point away from the
@@ -17,6 +25,9 @@
 //     vec3 closure_throughput(Closure closure)                        view: through fuzz, interface and medium, to what is below
 //     vec3 internal_reflectance(Slab slab)                            of diffuse light that hits the interface from below
 //     vec3 bounce_factor(vec3 internal, vec3 base_albedo)             (1 - K) / (1 - E_b K)
+//
+// What is not reciprocal: compensation, fuzz and what the interface leaves to the medium are computed towards the view only.
+// Energy is kept exactly that way (up to the error of the tables), and nothing but the lobes is computed for each light.
 
 struct ClosureValue {
     vec3 specular;    // interface and fuzz
@@ -26,8 +37,8 @@ struct ClosureValue {
 
 struct ClosureSample {
     vec3 direction;
-    float pdf;     // solid angle; for a mirror the probability of that choice; 0: nothing was sampled
-    vec3 weight;   // value times cosine over pdf
+    float pdf;       // solid angle; for a mirror the probability of that choice; 0: nothing was sampled
+    vec3 weight;     // value times cosine over pdf
     bool is_mirror;  // evaluate_closure and closure_pdf do not see this direction
 };
 
@@ -37,5 +48,259 @@ struct ClosureAlbedo {
     vec3 diffuse;       // and subsurface
     vec3 transmission;  // scattered through; what passes straight is closure_throughput
 };
+
+// One lobe of the interface, seen from the view.
+struct SpecularLobe {
+    vec2 alpha;
+    float view_length;
+    vec3 scale;      // on single scattering: compensation for multiple scattering, share of the lobe, what fuzz lets through
+    vec3 albedo;     // scale included
+    bool is_mirror;
+};
+
+struct Closure {
+    uint features;
+    vec3 view;
+    Fresnel fresnel;
+    SpecularLobe specular;
+#ifdef NACRE_SLAB_SECOND_LOBE
+    SpecularLobe second;
+    float second_probability;
+#endif
+#ifdef NACRE_SLAB_FUZZ
+    vec3 fuzz;  // albedo
+    SheenMap fuzz_map;
+    float fuzz_probability;
+#endif
+    float gloss;
+    vec3 diffuse;  // albedo
+    float diffuse_scale;  // one over the albedo of the diffuse lobe as it is
+    float specular_probability;
+    float diffuse_probability;
+};
+
+// Source of the compensation: Turquin 2019, "Practical multiple scattering compensation for microfacet models".
+SpecularLobe make_specular_lobe(Fresnel fresnel, vec3 view, float roughness, float anisotropy) {
+    SpecularLobe lobe;
+    lobe.is_mirror = ggx_is_mirror(roughness);
+    lobe.alpha = ggx_alpha(roughness, anisotropy);
+    lobe.view_length = ggx_stretched_length(view, lobe.alpha);
+    if (lobe.is_mirror) {
+        lobe.scale = vec3(1.0);
+        lobe.albedo = fresnel_reflectance(fresnel, view.z);
+        return lobe;
+    }
+    float alpha = sqrt(0.5 * dot(lobe.alpha, lobe.alpha));
+    GgxAlbedo albedo = ggx_albedo(min(view.z, 1.0), alpha);
+    lobe.scale = vec3(1.0) + fresnel_mean(fresnel) * ((1.0 - albedo.total) / albedo.total);
+    vec3 single = fresnel.normal + (fresnel.grazing - fresnel.normal) * albedo.schlick - fresnel.dip * albedo.dip;
+    lobe.albedo = clamp(single * albedo.total * lobe.scale, vec3(0.0), vec3(1.0));
+    return lobe;
+}
+
+Closure prepare_closure(Slab slab, vec3 view, float footprint) {
+    Closure closure;
+    closure.features = slab.features;
+    closure.view = vec3(view.x, view.y, max(view.z, smallest_cosine));
+    vec3 f90 = vec3(1.0);
+    vec3 f82 = vec3(1.0);
+    float anisotropy = 0.0;
+#ifdef NACRE_SLAB_F90
+    if ((slab.features & slab_f90) != 0u) f90 = slab.f90;
+#endif
+#ifdef NACRE_SLAB_F82
+    if ((slab.features & slab_f82) != 0u) f82 = slab.f82;
+#endif
+#ifdef NACRE_SLAB_ANISOTROPY
+    if ((slab.features & slab_anisotropy) != 0u) anisotropy = slab.anisotropy;
+#endif
+    closure.fresnel = make_fresnel(slab.f0, f90, f82);
+    closure.specular = make_specular_lobe(closure.fresnel, closure.view, slab.roughness, anisotropy);
+    vec3 interface_albedo = closure.specular.albedo;
+#ifdef NACRE_SLAB_SECOND_LOBE
+    closure.second_probability = 0.0;
+    if ((slab.features & slab_second_lobe) != 0u) {
+        closure.second = make_specular_lobe(closure.fresnel, closure.view, slab.second_roughness, anisotropy);
+        closure.specular.scale *= 1.0 - slab.second_weight;
+        closure.specular.albedo *= 1.0 - slab.second_weight;
+        closure.second.scale *= slab.second_weight;
+        closure.second.albedo *= slab.second_weight;
+        interface_albedo = closure.specular.albedo + closure.second.albedo;
+        closure.second_probability = largest(closure.second.albedo);
+    }
+#endif
+    float uncovered = 1.0;
+#ifdef NACRE_SLAB_FUZZ
+    closure.fuzz_probability = 0.0;
+    if ((slab.features & slab_fuzz) != 0u) {
+        float reflected = slab.fuzz_amount * sheen_albedo(min(closure.view.z, 1.0), slab.fuzz_roughness);
+        uncovered = 1.0 - reflected;
+        closure.fuzz = reflected * slab.fuzz_color;
+        closure.fuzz_map = sheen_map(closure.view, slab.fuzz_roughness);
+        closure.fuzz_probability = largest(closure.fuzz);
+        closure.specular.scale *= uncovered;
+        closure.specular.albedo *= uncovered;
+#ifdef NACRE_SLAB_SECOND_LOBE
+        closure.second.scale *= uncovered;
+        closure.second.albedo *= uncovered;
+        closure.second_probability *= uncovered;
+#endif
+    }
+#endif
+    closure.gloss = chan_gloss(slab.roughness);
+    closure.diffuse = slab.albedo * (vec3(1.0) - interface_albedo) * uncovered;
+    closure.diffuse_scale = 1.0 / chan_albedo_by_table(min(closure.view.z, 1.0), closure.gloss);
+    closure.specular_probability = largest(closure.specular.albedo);
+    closure.diffuse_probability = largest(closure.diffuse);
+    float sum = closure.specular_probability + closure.diffuse_probability;
+#ifdef NACRE_SLAB_SECOND_LOBE
+    sum += closure.second_probability;
+#endif
+#ifdef NACRE_SLAB_FUZZ
+    sum += closure.fuzz_probability;
+#endif
+    float scale = sum > 0.0 ? 1.0 / sum : 0.0;
+    closure.specular_probability *= scale;
+    closure.diffuse_probability *= scale;
+#ifdef NACRE_SLAB_SECOND_LOBE
+    closure.second_probability *= scale;
+#endif
+#ifdef NACRE_SLAB_FUZZ
+    closure.fuzz_probability *= scale;
+#endif
+    return closure;
+}
+
+vec3 specular_lobe_value(SpecularLobe lobe, vec3 view, vec3 light, vec3 h) {
+    if (lobe.is_mirror) return vec3(0.0);
+    return lobe.scale * ggx_value(view, lobe.view_length, light, h, lobe.alpha);
+}
+
+float specular_lobe_pdf(SpecularLobe lobe, vec3 view, vec3 light, vec3 h) {
+    if (lobe.is_mirror) return 0.0;
+    return ggx_pdf(view, lobe.view_length, light, h, lobe.alpha);
+}
+
+ClosureValue evaluate_closure(Closure closure, vec3 light) {
+    ClosureValue value;
+    value.specular = vec3(0.0);
+    value.diffuse = vec3(0.0);
+    value.subsurface = vec3(0.0);
+    if (light.z <= 0.0) return value;
+    vec3 h = half_vector(closure.view, light);
+    vec3 lobes = specular_lobe_value(closure.specular, closure.view, light, h);
+#ifdef NACRE_SLAB_SECOND_LOBE
+    if ((closure.features & slab_second_lobe) != 0u) lobes += specular_lobe_value(closure.second, closure.view, light, h);
+#endif
+    value.specular = lobes * fresnel_reflectance(closure.fresnel, half_vector_cosine(closure.view, light));
+#ifdef NACRE_SLAB_FUZZ
+    if ((closure.features & slab_fuzz) != 0u) value.specular += closure.fuzz * sheen_density(closure.fuzz_map, light);
+#endif
+    value.diffuse = closure.diffuse * (closure.diffuse_scale * chan_diffuse(closure.view, light, closure.gloss));
+    return value;
+}
+
+float closure_pdf(Closure closure, vec3 light) {
+    if (light.z <= 0.0) return 0.0;
+    vec3 h = half_vector(closure.view, light);
+    float pdf = closure.specular_probability * specular_lobe_pdf(closure.specular, closure.view, light, h);
+#ifdef NACRE_SLAB_SECOND_LOBE
+    if ((closure.features & slab_second_lobe) != 0u)
+        pdf += closure.second_probability * specular_lobe_pdf(closure.second, closure.view, light, h);
+#endif
+#ifdef NACRE_SLAB_FUZZ
+    if ((closure.features & slab_fuzz) != 0u) pdf += closure.fuzz_probability * sheen_density(closure.fuzz_map, light);
+#endif
+    return pdf + closure.diffuse_probability * light.z / pi;
+}
+
+ClosureSample sample_specular_lobe(SpecularLobe lobe, vec3 view, float probability, float random_x, float random_y) {
+    ClosureSample result;
+    result.is_mirror = lobe.is_mirror;
+    result.pdf = 0.0;
+    result.weight = vec3(0.0);
+    if (lobe.is_mirror) {
+        result.direction = vec3(-view.x, -view.y, view.z);
+        result.pdf = probability;
+        result.weight = lobe.albedo / probability;
+    } else {
+        result.direction = ggx_sample(view, lobe.view_length, lobe.alpha, random_x, random_y);
+    }
+    return result;
+}
+
+ClosureSample sample_closure(Closure closure, vec3 random) {
+    ClosureSample result;
+    result.pdf = 0.0;
+    result.weight = vec3(0.0);
+    result.is_mirror = false;
+    result.direction = vec3(0.0, 0.0, 1.0);
+    float left = random.x - closure.diffuse_probability;
+    bool chosen = left < 0.0;
+    if (chosen) result.direction = cosine_direction(random.y, random.z);
+#ifdef NACRE_SLAB_FUZZ
+    if (!chosen && (closure.features & slab_fuzz) != 0u) {
+        left -= closure.fuzz_probability;
+        chosen = left < 0.0;
+        if (chosen) result.direction = sheen_sample(closure.fuzz_map, random.y, random.z);
+    }
+#endif
+#ifdef NACRE_SLAB_SECOND_LOBE
+    if (!chosen && (closure.features & slab_second_lobe) != 0u) {
+        left -= closure.second_probability;
+        chosen = left < 0.0;
+        if (chosen)
+            result = sample_specular_lobe(closure.second, closure.view, closure.second_probability, random.y, random.z);
+    }
+#endif
+    if (!chosen && closure.specular_probability <= 0.0) return result;
+    if (!chosen)
+        result = sample_specular_lobe(closure.specular, closure.view, closure.specular_probability, random.y, random.z);
+    if (result.is_mirror) return result;
+    result.pdf = closure_pdf(closure, result.direction);
+    if (result.pdf > 0.0) {
+        ClosureValue value = evaluate_closure(closure, result.direction);
+        result.weight = (value.specular + value.diffuse + value.subsurface) / result.pdf;
+    }
+    return result;
+}
+
+ClosureAlbedo closure_albedo(Closure closure) {
+    ClosureAlbedo albedo;
+    albedo.specular = closure.specular.albedo;
+    albedo.fuzz = vec3(0.0);
+#ifdef NACRE_SLAB_SECOND_LOBE
+    if ((closure.features & slab_second_lobe) != 0u) albedo.specular += closure.second.albedo;
+#endif
+#ifdef NACRE_SLAB_FUZZ
+    if ((closure.features & slab_fuzz) != 0u) albedo.fuzz = closure.fuzz;
+#endif
+    albedo.diffuse = closure.diffuse;
+    albedo.transmission = vec3(0.0);
+    return albedo;
+}
+
+vec3 closure_transmittance(Closure closure, float cos_theta) { return vec3(0.0); }
+
+vec3 closure_throughput(Closure closure) { return vec3(0.0); }
+
+// Of diffuse light that hits the interface from the medium's side: what leaves through a denser medium's surface is what enters
+// it, spread over index^2 times the angle.
+float internal_reflectance_of(float f0, float mean) { return 1.0 - (1.0 - mean) / square(reflectance_to_ior(f0)); }
+
+vec3 internal_reflectance(Slab slab) {
+    Fresnel fresnel = make_fresnel(slab.f0, vec3(1.0), vec3(1.0));
+    vec3 mean = fresnel_mean(fresnel);
+    return vec3(internal_reflectance_of(slab.f0.x, mean.x), internal_reflectance_of(slab.f0.y, mean.y),
+                internal_reflectance_of(slab.f0.z, mean.z));
+}
+
+// What a diffuse base of albedo base_albedo under an interface sends out, relative to its first bounce: the light that the
+// interface throws back hits the base again, and again. Source: OpenPBR, "Coat darkening".
+vec3 bounce_factor(vec3 internal, vec3 base_albedo) {
+    vec3 passed = vec3(1.0) - internal;
+    // Written so that nothing is lost where both are 1.
+    return (passed + vec3(1e-9)) / (passed + internal * (vec3(1.0) - base_albedo) + vec3(1e-9));
+}
 
 #endif

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef NACRE_CLOSURES_FRESNEL
+#define NACRE_CLOSURES_FRESNEL
+#include "materials/closures/math.glsl"
+
+// Reflectance of an interface by angle: at + (grazing - at) (1 - c)^5 - dip c (1 - c)^6, c the cosine to the (micro)normal.
+// Sources: Schlick 1994; the dip at 82 degrees: Hoffman 2019, "Fresnel equations considered harmful".
+struct Fresnel {
+    vec3 normal;   // reflectance at normal incidence
+    vec3 grazing;  // largest channel 1, or less where `normal` is below that of any matter
+    vec3 dip;
+};
+
+// Below this reflectance (that of ice) the grazing reflectance fades: an interface between equal indices reflects nothing at any
+// angle, which Schlick's formula misses.
+const float smallest_reflectance = 0.02;
+
+Fresnel make_fresnel(vec3 f0, vec3 f90, vec3 f82) {
+    Fresnel fresnel;
+    fresnel.normal = f0;
+    float brightest = largest(f90);
+    vec3 tint = brightest > 0.0 ? f90 / brightest : vec3(1.0);
+    fresnel.grazing = tint * saturated(largest(f0) / smallest_reflectance);
+    // (6/7)^5 and (1/7) (6/7)^6: the two terms where the dip is largest, at c = 1/7.
+    fresnel.dip = (f0 + (fresnel.grazing - f0) * 0.46266436) * (vec3(1.0) - f82) * 17.65132;
+    return fresnel;
+}
+
+vec3 fresnel_reflectance(Fresnel fresnel, float cos_theta) {
+    float m = saturated(1.0 - cos_theta);
+    float m5 = power5(m);
+    return max(fresnel.normal + (fresnel.grazing - fresnel.normal) * m5 - fresnel.dip * (cos_theta * m5 * m), vec3(0.0));
+}
+
+// Mean over a hemisphere under diffuse light: integral of 2 c F(c).
+vec3 fresnel_mean(Fresnel fresnel) {
+    return max(fresnel.normal + (fresnel.grazing - fresnel.normal) / 21.0 - fresnel.dip / 126.0, vec3(0.0));
+}
+
+// Index of refraction of a dielectric by its reflectance at normal incidence, and back. An index above 199 (reflectance 0.98)
+// stands for all that is opaque.
+float reflectance_to_ior(float f0) {
+    float root = sqrt(clamp(f0, 0.0, 0.98));
+    return (1.0 + root) / (1.0 - root);
+}
+
+float ior_to_reflectance(float ior) { return square((ior - 1.0) / (ior + 1.0)); }
+
+// Cosine of the refracted direction inside a denser medium.
+float refracted_cosine(float cos_theta, float ior) {
+    float sine = sqrt(max(1.0 - cos_theta * cos_theta, 0.0)) / ior;
+    return sqrt(max(1.0 - sine * sine, 0.0));
+}
+
+// Reflectance at normal incidence of what lies under a medium of index coat_ior, from its reflectance in air. Exact for
+// dielectrics: the index comes back from the reflectance.
+float reflectance_under(float f0, float coat_ior) {
+    float ior = reflectance_to_ior(f0);
+    return square((ior - coat_ior) / (ior + coat_ior));
+}
+
+#endif

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <glm/common.hpp>
+#include <glm/exponential.hpp>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+/// @file
+/// The lobes of materials/closures/*.glsl as C++ in double precision, from the same text: the reference for what devices
+/// compute. The functions are members so that the text needs no storage classes; an object has no state.
+///
+///     closures::Lobes lobes;
+///     double peak = lobes.ggx_distribution({0.0, 0.0, 1.0}, {0.1, 0.1});
+
+namespace nacre::materials::closures {
+
+using glm::abs, glm::clamp, glm::cos, glm::cross, glm::dot, glm::exp, glm::exp2, glm::floor, glm::fract;
+using glm::inversesqrt, glm::length, glm::log, glm::log2, glm::max, glm::min, glm::mix, glm::normalize, glm::pow;
+using glm::sin, glm::sqrt;
+
+struct Lobes {
+    using uint = std::uint32_t;
+    using vec2 = glm::dvec2;
+    using vec3 = glm::dvec3;
+    using vec4 = glm::dvec4;
+
+// In these files every `const` is a constant outside of functions.
+#define float double
+#define const static constexpr
+#include "materials/closures/features.glsl"
+#include "materials/closures/math.glsl"
+#include "materials/closures/fresnel.glsl"
+#include "materials/closures/ggx.glsl"
+#include "materials/closures/diffuse.glsl"
+#include "materials/closures/fuzz.glsl"
+#undef const
+#undef float
+};
+
+}  // namespace nacre::materials::closures

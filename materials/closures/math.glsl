@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef NACRE_CLOSURES_MATH
+#define NACRE_CLOSURES_MATH
+// The files of this folder are GLSL and C++ at once (materials/closures/library.h compiles them in double precision): no
+// swizzles beyond .x .y .z .w, no out parameters, no constructors of structs and arrays, no textures.
+
+const float pi = 3.14159265358979323846;
+
+// Views nearer to the surface than this are moved here.
+const float smallest_cosine = 1e-8;
+
+float square(float x) { return x * x; }
+float power5(float x) { return square(square(x)) * x; }
+float power6(float x) { return square(square(x) * x); }
+
+float largest(vec3 v) { return max(v.x, max(v.y, v.z)); }
+float saturated(float x) { return clamp(x, 0.0, 1.0); }
+
+// Unit vector between two; their common axis where they are opposite.
+vec3 half_vector(vec3 a, vec3 b) {
+    vec3 sum = a + b;
+    float length_squared = dot(sum, sum);
+    if (length_squared < 1e-30) return vec3(0.0, 0.0, 1.0);
+    return sum * inversesqrt(length_squared);
+}
+
+// Cosine between either of two unit vectors and their half vector. The length of the sum has the digits that the scalar
+// product loses where the two are nearly opposite.
+float half_vector_cosine(vec3 a, vec3 b) { return min(0.5 * length(a + b), 1.0); }
+
+// Density cos / pi.
+vec3 cosine_direction(float random_x, float random_y) {
+    float radius = sqrt(random_x);
+    float phi = 2.0 * pi * random_y;
+    return vec3(radius * cos(phi), radius * sin(phi), sqrt(1.0 - random_x));
+}
+
+#endif

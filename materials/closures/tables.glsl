@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef NACRE_CLOSURES_TABLES
+#define NACRE_CLOSURES_TABLES
+#include "materials/closures/diffuse.glsl"
+#include "materials/closures/ggx.glsl"
+// Directional albedos by table. Who includes this has defined
+//
+//     vec4 interface_table(vec2 at)     materials/tables/interface_table.h, bilinear, (0, 0) and (1, 1) being the first and the
+//                                       last entry: a texture's coordinate is (at * 63 + 0.5) / 64
+
+// What a GGX lobe with single scattering reflects towards a direction.
+struct GgxAlbedo {
+    float total;    // with F = 1
+    float schlick;  // mean of (1 - c)^5 over that light
+    float dip;      // mean of c (1 - c)^6 over that light
+};
+
+GgxAlbedo ggx_albedo(float cos_theta, float alpha) {
+    vec4 entry = interface_table(vec2(ggx_table_coordinate(cos_theta, alpha), sqrt(alpha)));
+    float typical = ggx_typical_cosine(cos_theta, alpha);
+    float m = 1.0 - typical;
+    GgxAlbedo albedo;
+    albedo.total = entry.x;
+    albedo.schlick = clamp(power5(m) + (entry.y - 0.25) * 0.5, 0.0, 1.0);
+    albedo.dip = max(typical * power6(m) + (entry.z - 0.25) * 0.125, 0.0);
+    return albedo;
+}
+
+// Of Chan's diffuse model; never 0.
+float chan_albedo_by_table(float cos_theta, float gloss) {
+    float coordinate = chan_sharpness_coordinate(chan_sharpness(gloss));
+    return chan_albedo(cos_theta, gloss, interface_table(vec2(sqrt(cos_theta), coordinate)).w / 32.0);
+}
+
+#endif

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "materials/tables/interface_table.h"
+
+namespace nacre::materials {
+namespace {
+
+constexpr std::uint16_t table[] = {
+#include "materials/tables/interface_table_data.inc"
+};
+static_assert(sizeof(table) == 2 * 4 * interface_table_size * interface_table_size);
+
+}  // namespace
+
+std::span<const std::uint16_t> interface_table() { return table; }
+
+}  // namespace nacre::materials

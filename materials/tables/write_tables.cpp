@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+/// @file
+/// Writes the data of one table to standard output; run by hand when its generator changes:
+///
+///     build/bin/write_tables interface > materials/tables/interface_table_data.inc
+
+#include <cmath>
+#include <cstdio>
+#include <string_view>
+
+#include "materials/tables/interface_table_generator.h"
+
+namespace {
+
+/// Words as hexadecimal numbers, 16 a line.
+class WordWriter {
+  public:
+    void write(double value) {
+        const long word = std::lround(std::fmin(std::fmax(value, 0.0), 1.0) * 65535.0);
+        std::printf("0x%04lx,%s", word, ++count_ % 16 == 0 ? "\n" : "");
+    }
+
+  private:
+    long count_ = 0;
+};
+
+void write_interface_table() {
+    using namespace nacre::materials;
+    WordWriter words;
+    for (std::uint32_t row = 0; row < interface_table_size; ++row) {
+        for (std::uint32_t column = 0; column < interface_table_size; ++column) {
+            for (const double value : interface_table_entry(row, column, 256)) words.write(value);
+        }
+    }
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+    const std::string_view name = count == 2 ? arguments[1] : "";
+    std::puts("// SPDX-License-Identifier: Apache-2.0\n// Written by materials/tables/write_tables.cpp.");
+    if (name == "interface") {
+        write_interface_table();
+    } else {
+        std::fputs("write_tables: name one table: interface\n", stderr);
+        return 2;
+    }
+}
