@@ -85,7 +85,7 @@ Slab blend_slabs(Slab a, Slab b, BlendShares shares) {
                                            vec3(1.0) / max(mean_free_path_b, vec3(1e-12)), t));
     slab.phase_anisotropy = mix((a.features & slab_medium) != 0u ? a.phase_anisotropy : 0.0,
                                 (b.features & slab_medium) != 0u ? b.phase_anisotropy : 0.0, t);
-    slab.thickness = mix(a.thickness, b.thickness, t);
+    if (t > 0.5) slab.thickness = b.thickness;
 #endif
 #ifdef NACRE_SLAB_EMISSION
     slab.emission = (((a.features & slab_emission) != 0u ? a.emission : vec3(0.0)) * shares.first_light +
@@ -110,16 +110,19 @@ Slab mix_slabs(Slab a, Slab b, float amount) {
     return blend_slabs(a, b, shares);
 }
 
-// `through`: of the base's light, what the top lets through where it covers (Matter::view_transmittance and the gain of the
-// bounces between both).
-Slab layer_slabs(Slab top, Slab base, vec3 through) {
+// A layer; the matters are those of both slabs.
+Slab layer_slabs(Slab top, Slab base, Matter top_matter, Matter base_matter) {
+    vec3 through = top_matter.view_transmittance * bounce_factor(top_matter.internal, base_matter.albedo);
     BlendShares shares;
     shares.coverage = top.coverage + (1.0 - top.coverage) * base.coverage;
     shares.first = top.coverage;
     shares.first_light = vec3(top.coverage);
     shares.second_light = base.coverage * (vec3(1.0 - top.coverage) + top.coverage * through);
     shares.second = largest(shares.second_light);
-    Slab slab = blend_slabs(top, base, shares);
+    // What a clear medium would scatter is not there to be seen.
+    Slab seen = top;
+    seen.albedo = top.albedo * (vec3(1.0) - top_matter.transmittance);
+    Slab slab = blend_slabs(seen, base, shares);
     // Both interfaces are there and the base's medium is below both; only what is in the top's own medium counts by share.
 #ifdef NACRE_SLAB_MEDIUM
     if ((base.features & slab_medium) == 0u) {

@@ -98,23 +98,27 @@ SpecularLobe make_specular_lobe(Fresnel fresnel, vec3 view, float roughness, flo
     return lobe;
 }
 
-Closure prepare_closure(Slab slab, vec3 view, float footprint) {
-    Closure closure;
-    closure.features = slab.features;
-    closure.view = vec3(view.x, view.y, max(view.z, smallest_cosine));
+Fresnel slab_fresnel(Slab slab) {
     vec3 f90 = vec3(1.0);
     vec3 f82 = vec3(1.0);
-    float anisotropy = 0.0;
 #ifdef NACRE_SLAB_F90
     if ((slab.features & slab_f90) != 0u) f90 = slab.f90;
 #endif
 #ifdef NACRE_SLAB_F82
     if ((slab.features & slab_f82) != 0u) f82 = slab.f82;
 #endif
+    return make_fresnel(slab.f0, f90, f82);
+}
+
+Closure prepare_closure(Slab slab, vec3 view, float footprint) {
+    Closure closure;
+    closure.features = slab.features;
+    closure.view = vec3(view.x, view.y, max(view.z, smallest_cosine));
+    float anisotropy = 0.0;
 #ifdef NACRE_SLAB_ANISOTROPY
     if ((slab.features & slab_anisotropy) != 0u) anisotropy = slab.anisotropy;
 #endif
-    closure.fresnel = make_fresnel(slab.f0, f90, f82);
+    closure.fresnel = slab_fresnel(slab);
     closure.specular = make_specular_lobe(closure.fresnel, closure.view, slab.roughness, anisotropy);
     vec3 interface_albedo = closure.specular.albedo;
 #ifdef NACRE_SLAB_SECOND_LOBE

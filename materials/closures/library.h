@@ -34,6 +34,8 @@ struct Library : Lobes {
 #define float double
 #define const static constexpr
 #include "materials/closures/closure.glsl"
+#include "materials/closures/operators.glsl"
+#include "materials/closures/blending.glsl"
 #undef const
 #undef float
 #undef NACRE_SLAB_ANISOTROPY

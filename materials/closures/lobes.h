@@ -10,6 +10,8 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include "materials/slab.h"  // first: its features.glsl is the one that counts
+
 /// @file
 /// The lobes of materials/closures/*.glsl as C++ in double precision, from the same text: the reference for what devices
 /// compute. The functions are members so that the text needs no storage classes; an object has no state.

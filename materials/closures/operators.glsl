@@ -81,15 +81,21 @@ float slab_coverage(Slab slab, float cos_view) {
     return slab.coverage;
 }
 
+// What a layer above a slab needs to know of it. The albedo is that under diffuse light.
+Matter base_matter(Slab slab, float cos_view) {
+    Matter m = no_matter();
+    m.coverage = slab_coverage(slab, cos_view);
+    vec3 mean = fresnel_mean(slab_fresnel(slab));
+    m.albedo = mean + (vec3(1.0) - mean) * slab.albedo;
+    return m;
+}
+
 // A slab as what lies below and around it sees it.
 Matter slab_matter(Slab slab, Closure closure) {
-    Matter m;
-    m.coverage = slab_coverage(slab, closure.view.z);
+    Matter m = base_matter(slab, closure.view.z);
     m.transmittance = closure_transmittance(closure, 1.0);
     m.view_transmittance = closure_throughput(closure) + closure_albedo(closure).transmission;
     m.internal = internal_reflectance(slab);
-    vec3 mean = fresnel_mean(closure.fresnel);
-    m.albedo = mean + (vec3(1.0) - mean) * slab.albedo;
     m.variance = refraction_variance(slab.roughness);
     return m;
 }
