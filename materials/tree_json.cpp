@@ -1,0 +1,506 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "materials/tree_json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <initializer_list>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "core/file.h"
+
+namespace nacre::materials {
+namespace {
+
+using json = nlohmann::ordered_json;
+
+constexpr std::uint64_t largest_file = std::uint64_t{16} << 20;
+constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr std::string_view channel_names = "rgba";
+
+class Reader {
+  public:
+    explicit Reader(std::string_view source) : source_(source) {}
+
+    Expected<MaterialFile> file(const json& document) {
+        NACRE_CHECK(members(document, "the document",
+                            {"$schema", "nacre_material", "name", "thin", "surface_thickness", "images", "frames", "root"}));
+        if (!document.contains("nacre_material") || document["nacre_material"] != 1) {
+            return refuse("nacre_material", "it must be 1, the version of the format", "Write \"nacre_material\": 1.");
+        }
+        MaterialFile result;
+        if (document.contains("name")) NACRE_CHECK(text(document["name"], "name", result.tree.name));
+        if (document.contains("thin")) {
+            if (!document["thin"].is_boolean()) return refuse("thin", "it is no boolean", "Write true or false.");
+            result.tree.thin = document["thin"];
+        }
+        if (document.contains("surface_thickness"))
+            NACRE_CHECK(number(document["surface_thickness"], "surface_thickness", result.tree.surface_thickness));
+        if (document.contains("images")) {
+            if (!document["images"].is_array()) return refuse("images", "it is no array", "Write a list of paths.");
+            for (const json& image : document["images"]) {
+                std::string path;
+                NACRE_CHECK(text(image, fmt::format("images[{}]", result.images.size()), path));
+                result.images.emplace_back(path);
+            }
+        }
+        images_ = result.images.size();
+        if (document.contains("frames")) {
+            if (!document["frames"].is_array() || document["frames"].empty())
+                return refuse("frames", "it is no list of at least one frame", "Leave it out where all slabs share the surface's.");
+            result.tree.frames.clear();
+            for (const json& frame : document["frames"]) {
+                TangentFrame read;
+                NACRE_CHECK(tangent_frame(frame, fmt::format("frames[{}]", result.tree.frames.size()), read));
+                result.tree.frames.push_back(read);
+            }
+        }
+        if (!document.contains("root")) return refuse("root", "it is missing", "Write the tree's uppermost node there.");
+        NACRE_TRY(result.tree.root, node(document["root"], "root", 0, result.tree));
+        if (auto valid = validate(result.tree); !valid) {
+            Error error = valid.error();
+            error.subject = fmt::format("'{}': {}", source_, error.subject);
+            return std::unexpected(error);
+        }
+        return result;
+    }
+
+    std::unexpected<Error> refuse(std::string_view place, std::string reason, std::string remedy) const {
+        return fail(ErrorCode::parse, "read material", fmt::format("'{}': {}", source_, place), std::move(reason), std::move(remedy));
+    }
+
+  private:
+    Expected<void> members(const json& value, std::string_view place, std::initializer_list<std::string_view> known) const {
+        return members(value, place, std::vector<std::string_view>(known));
+    }
+
+    Expected<void> members(const json& value, std::string_view place, const std::vector<std::string_view>& known) const {
+        if (!value.is_object()) return refuse(place, fmt::format("it is a {}, not an object", value.type_name()), "Write {...}.");
+        for (const auto& [key, ignored] : value.items()) {
+            if (std::ranges::find(known, key) == known.end()) {
+                return refuse(place, fmt::format("it has the unknown member '{}'", key),
+                              fmt::format("The members are {}.", fmt::join(known, ", ")));
+            }
+        }
+        return {};
+    }
+
+    Expected<void> text(const json& value, std::string_view place, std::string& result) const {
+        if (!value.is_string()) return refuse(place, fmt::format("it is a {}, not a text", value.type_name()), "Write \"...\".");
+        result = value.get<std::string>();
+        return {};
+    }
+
+    Expected<void> number(const json& value, std::string_view place, float& result) const {
+        if (value.is_string() && value.get<std::string>() == "infinity") {
+            result = infinity;
+            return {};
+        }
+        if (!value.is_number()) {
+            return refuse(place, fmt::format("it is a {}, not a number", value.type_name()), "Write a number, or \"infinity\".");
+        }
+        const double wide = value.get<double>();
+        if (std::abs(wide) > std::numeric_limits<float>::max()) {
+            return refuse(place, fmt::format("{} is beyond what a float holds", wide), "Write \"infinity\" where that is meant.");
+        }
+        result = static_cast<float>(wide);
+        return {};
+    }
+
+    Expected<void> index(const json& value, std::string_view place, std::size_t count, int& result) const {
+        if (!value.is_number_integer() || value.get<double>() < 0 || value.get<double>() >= static_cast<double>(count)) {
+            return refuse(place, fmt::format("it is {}, not an index below {}", value.dump(), count), "Indices begin at 0.");
+        }
+        result = value.get<int>();
+        return {};
+    }
+
+    // The members of a texture that are those of a reference.
+    Expected<void> reference(const json& value, const std::string& place, TextureReference& result) const {
+        if (!value.contains("image")) return refuse(place, "it has no image", "Write the index of one in 'images'.");
+        NACRE_CHECK(index(value["image"], place + ".image", images_, result.image));
+        result.sampler = 0;
+        if (value.contains("uv_set")) NACRE_CHECK(index(value["uv_set"], place + ".uv_set", 2, result.uv_set));
+        const auto pair = [&](const char* name, glm::vec2& target) -> Expected<void> {
+            if (!value.contains(name)) return {};
+            if (!value[name].is_array() || value[name].size() != 2)
+                return refuse(place + "." + name, "it is no pair", "Write [x, y].");
+            for (int i = 0; i < 2; ++i) NACRE_CHECK(number(value[name][static_cast<std::size_t>(i)], place + "." + name, target[i]));
+            return {};
+        };
+        NACRE_CHECK(pair("uv_offset", result.transform.offset));
+        NACRE_CHECK(pair("uv_scale", result.transform.scale));
+        if (value.contains("uv_rotation")) NACRE_CHECK(number(value["uv_rotation"], place + ".uv_rotation", result.transform.rotation));
+        return {};
+    }
+
+    Expected<void> tangent_frame(const json& value, const std::string& place, TangentFrame& result) const {
+        NACRE_CHECK(members(value, place, {"normal", "rotation", "rotation_texture"}));
+        if (value.contains("rotation")) NACRE_CHECK(number(value["rotation"], place + ".rotation", result.rotation));
+        if (value.contains("normal")) {
+            NACRE_CHECK(members(value["normal"], place + ".normal",
+                                {"image", "uv_set", "uv_offset", "uv_scale", "uv_rotation", "strength"}));
+            NACRE_CHECK(reference(value["normal"], place + ".normal", result.normal_texture));
+            if (value["normal"].contains("strength"))
+                NACRE_CHECK(number(value["normal"]["strength"], place + ".normal.strength", result.normal_texture.scale));
+        }
+        if (value.contains("rotation_texture")) {
+            NACRE_CHECK(members(value["rotation_texture"], place + ".rotation_texture",
+                                {"image", "uv_set", "uv_offset", "uv_scale", "uv_rotation"}));
+            NACRE_CHECK(reference(value["rotation_texture"], place + ".rotation_texture", result.rotation_texture));
+        }
+        return {};
+    }
+
+    // A number, a color, or either under "value" beside a "texture". `set` takes one channel.
+    template <typename Set>
+    Expected<void> input(const json& value, const std::string& place, std::string_view field, std::uint32_t channels, Node& owner,
+                         Set&& set) const {
+        const json* constant = &value;
+        if (value.is_object()) {
+            NACRE_CHECK(members(value, place, {"value", "texture"}));
+            constant = value.contains("value") ? &value["value"] : nullptr;
+            if (value.contains("texture")) {
+                const json& texture = value["texture"];
+                const std::string at = place + ".texture";
+                NACRE_CHECK(members(texture, at,
+                                    {"image", "uv_set", "uv_offset", "uv_scale", "uv_rotation", "channel", "scale", "bias"}));
+                TextureInput read{.field = std::string(field)};
+                NACRE_CHECK(reference(texture, at, read.texture));
+                if (texture.contains("channel")) {
+                    std::string name;
+                    NACRE_CHECK(text(texture["channel"], at + ".channel", name));
+                    const std::size_t found = name.size() == 1 ? channel_names.find(name) : std::string_view::npos;
+                    if (found == std::string_view::npos)
+                        return refuse(at + ".channel", fmt::format("it is '{}'", name), "Write r, g, b or a.");
+                    read.channel = static_cast<std::uint32_t>(found);
+                }
+                if (texture.contains("scale")) NACRE_CHECK(number(texture["scale"], at + ".scale", read.scale));
+                if (texture.contains("bias")) NACRE_CHECK(number(texture["bias"], at + ".bias", read.bias));
+                owner.textures.push_back(read);
+            }
+            if (constant == nullptr) return {};
+        }
+        if (constant->is_array()) {
+            if (constant->size() != channels) {
+                return refuse(place, fmt::format("it has {} numbers, not {}", constant->size(), channels),
+                              channels == 1 ? "Write one number." : "Write one number for all channels, or [red, green, blue].");
+            }
+            for (std::uint32_t channel = 0; channel < channels; ++channel) {
+                float read = 0.0f;
+                NACRE_CHECK(number((*constant)[channel], fmt::format("{}[{}]", place, channel), read));
+                set(channel, read);
+            }
+            return {};
+        }
+        float read = 0.0f;
+        NACRE_CHECK(number(*constant, place, read));
+        for (std::uint32_t channel = 0; channel < channels; ++channel) set(channel, read);
+        return {};
+    }
+
+    Expected<NodeIndex> slab(const json& value, const std::string& place, Tree& tree) const {
+        std::vector<std::string_view> known{"name", "frame", "features"};
+        for (const SlabField& field : slab_fields()) known.emplace_back(field.name);
+        NACRE_CHECK(members(value, place, known));
+        Node read;
+        if (value.contains("name")) NACRE_CHECK(text(value["name"], place + ".name", read.name));
+        if (value.contains("frame")) {
+            int frame = 0;
+            NACRE_CHECK(index(value["frame"], place + ".frame", tree.frames.size(), frame));
+            read.frame = static_cast<std::uint32_t>(frame);
+        }
+        if (value.contains("features")) {
+            if (!value["features"].is_array()) return refuse(place + ".features", "it is no list", "Write a list of names.");
+            for (const json& item : value["features"]) {
+                std::string name;
+                NACRE_CHECK(text(item, place + ".features", name));
+                std::vector<std::string_view> names;
+                for (const SlabFeature& feature : slab_features()) {
+                    names.emplace_back(feature.name);
+                    if (name == feature.name) read.slab.features |= feature.bit;
+                }
+                if (std::ranges::find(names, name) == names.end()) {
+                    return refuse(place + ".features", fmt::format("there is no feature '{}'", name),
+                                  fmt::format("The features are {}.", fmt::join(names, ", ")));
+                }
+            }
+        }
+        for (const SlabField& field : slab_fields()) {
+            if (!value.contains(field.name)) continue;
+            read.slab.features |= field.feature;
+            NACRE_CHECK(input(value[field.name], fmt::format("{}.{}", place, field.name), field.name, field.channels, read,
+                              [&](std::uint32_t channel, float number) { field.set(read.slab, channel, number); }));
+        }
+        tree.nodes.push_back(std::move(read));
+        return static_cast<NodeIndex>(tree.nodes.size() - 1);
+    }
+
+    Expected<NodeIndex> node(const json& value, const std::string& place, std::uint32_t depth, Tree& tree) const {
+        NACRE_CHECK(members(value, place, {"slab", "mix", "layer", "coverage"}));
+        if (value.size() != 1) {
+            return refuse(place, fmt::format("it has {} members", value.size()), "A node has one: slab, mix, layer or coverage.");
+        }
+        const std::string kind = value.begin().key();
+        const json& body = value.begin().value();
+        const std::string at = place + "." + kind;
+        if (kind == "slab") return slab(body, at, tree);
+        if (depth >= max_tree_depth) {
+            return refuse(place, fmt::format("more than {} operators lie above it", max_tree_depth),
+                          "Arrange the operators in a flatter tree.");
+        }
+        Node read;
+        const auto child = [&](const char* name) -> Expected<NodeIndex> {
+            if (!body.contains(name)) return refuse(at, fmt::format("it has no '{}'", name), "Write the node there.");
+            return node(body[name], at + "." + name, depth + 1, tree);
+        };
+        if (kind == "layer") {
+            read.kind = NodeKind::layer;
+            NACRE_CHECK(members(body, at, {"name", "top", "base", "thickness", "parameter_blend"}));
+            if (body.contains("thickness")) NACRE_CHECK(number(body["thickness"], at + ".thickness", read.thickness));
+            NACRE_TRY(read.first, child("top"));
+            NACRE_TRY(read.second, child("base"));
+        } else {
+            read.kind = kind == "mix" ? NodeKind::mix : NodeKind::coverage;
+            const bool is_mix = read.kind == NodeKind::mix;
+            NACRE_CHECK(is_mix ? members(body, at, {"name", "first", "second", "amount", "parameter_blend"})
+                               : members(body, at, {"name", "of", "amount"}));
+            read.amount = 1.0f;
+            if (!body.contains("amount")) return refuse(at, "it has no 'amount'", "Write a number in [0, 1], or a texture.");
+            NACRE_CHECK(input(body["amount"], at + ".amount", "amount", 1, read,
+                              [&](std::uint32_t, float number) { read.amount = number; }));
+            NACRE_TRY(read.first, child(is_mix ? "first" : "of"));
+            if (is_mix) {
+                NACRE_TRY(read.second, child("second"));
+            }
+        }
+        if (body.contains("name")) NACRE_CHECK(text(body["name"], at + ".name", read.name));
+        if (body.contains("parameter_blend")) {
+            if (!body["parameter_blend"].is_boolean())
+                return refuse(at + ".parameter_blend", "it is no boolean", "Write true or false.");
+            read.parameter_blend = body["parameter_blend"];
+        }
+        tree.nodes.push_back(std::move(read));
+        return static_cast<NodeIndex>(tree.nodes.size() - 1);
+    }
+
+    std::string_view source_;
+    std::size_t images_ = 0;
+};
+
+// The shortest decimal that reads back to the same float.
+json number_json(float value) {
+    if (std::isinf(value)) return "infinity";
+    return std::strtod(fmt::format("{}", value).c_str(), nullptr);
+}
+
+json reference_json(const TextureReference& reference) {
+    json result{{"image", reference.image}};
+    if (reference.uv_set != 0) result["uv_set"] = reference.uv_set;
+    const TextureTransform plain;
+    if (reference.transform.offset != plain.offset)
+        result["uv_offset"] = {number_json(reference.transform.offset.x), number_json(reference.transform.offset.y)};
+    if (reference.transform.scale != plain.scale)
+        result["uv_scale"] = {number_json(reference.transform.scale.x), number_json(reference.transform.scale.y)};
+    if (reference.transform.rotation != 0.0f) result["uv_rotation"] = number_json(reference.transform.rotation);
+    return result;
+}
+
+const TextureInput* texture_of(const Node& node, std::string_view field) {
+    const auto found = std::ranges::find(node.textures, field, &TextureInput::field);
+    return found == node.textures.end() ? nullptr : &*found;
+}
+
+json with_texture(json constant, const TextureInput* input) {
+    if (input == nullptr) return constant;
+    json texture = reference_json(input->texture);
+    if (input->channel != 0) texture["channel"] = std::string(1, channel_names[input->channel]);
+    if (input->scale != 1.0f) texture["scale"] = number_json(input->scale);
+    if (input->bias != 0.0f) texture["bias"] = number_json(input->bias);
+    return json{{"value", std::move(constant)}, {"texture", std::move(texture)}};
+}
+
+json slab_json(const Node& node) {
+    const Slab plain;
+    json result = json::object();
+    if (!node.name.empty()) result["name"] = node.name;
+    if (node.frame != 0) result["frame"] = node.frame;
+    std::uint32_t shown = 0;
+    json fields = json::object();
+    for (const SlabField& field : slab_fields()) {
+        if (field.feature != 0 && (node.slab.features & field.feature) == 0) continue;
+        const TextureInput* texture = texture_of(node, field.name);
+        bool is_plain = texture == nullptr, is_gray = true;
+        for (std::uint32_t channel = 0; channel < field.channels; ++channel) {
+            is_plain &= field.get(node.slab, channel) == field.get(plain, channel);
+            is_gray &= field.get(node.slab, channel) == field.get(node.slab, 0);
+        }
+        if (is_plain) continue;
+        shown |= field.feature;
+        json constant = number_json(field.get(node.slab, 0));
+        if (!is_gray) {
+            constant = json::array();
+            for (std::uint32_t channel = 0; channel < field.channels; ++channel)
+                constant.push_back(number_json(field.get(node.slab, channel)));
+        }
+        fields[field.name] = with_texture(std::move(constant), texture);
+    }
+    json features = json::array();
+    for (const SlabFeature& feature : slab_features()) {
+        if ((node.slab.features & feature.bit) != 0 && (shown & feature.bit) == 0) features.push_back(feature.name);
+    }
+    if (!features.empty()) result["features"] = std::move(features);
+    result.update(fields);
+    return result;
+}
+
+json node_json(const Tree& tree, NodeIndex index) {
+    const Node& node = tree.nodes[index];
+    json body = json::object();
+    if (node.kind == NodeKind::slab) return json{{"slab", slab_json(node)}};
+    if (!node.name.empty()) body["name"] = node.name;
+    switch (node.kind) {
+        case NodeKind::mix:
+            body["first"] = node_json(tree, node.first);
+            body["second"] = node_json(tree, node.second);
+            body["amount"] = with_texture(number_json(node.amount), texture_of(node, "amount"));
+            break;
+        case NodeKind::layer:
+            body["top"] = node_json(tree, node.first);
+            body["base"] = node_json(tree, node.second);
+            if (node.thickness >= 0.0f) body["thickness"] = number_json(node.thickness);
+            break;
+        case NodeKind::coverage:
+            body["of"] = node_json(tree, node.first);
+            body["amount"] = with_texture(number_json(node.amount), texture_of(node, "amount"));
+            break;
+        case NodeKind::slab: break;
+    }
+    if (node.parameter_blend) body["parameter_blend"] = true;
+    return json{{std::string(name_of(node.kind)), std::move(body)}};
+}
+
+json object_schema(json properties, json required = json::array()) {
+    json result{{"type", "object"}, {"properties", std::move(properties)}, {"additionalProperties", false}};
+    if (!required.empty()) result["required"] = std::move(required);
+    return result;
+}
+
+}  // namespace
+
+Expected<MaterialFile> parse_material(std::string_view text, std::string_view source) {
+    const Reader reader(source);
+    json document;
+    try {
+        document = json::parse(text);
+    } catch (const json::parse_error& error) {
+        const std::size_t at = std::min(error.byte > 0 ? error.byte - 1 : 0, text.size());
+        const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n') + 1;
+        const std::size_t line_start = text.substr(0, at).rfind('\n');
+        const std::size_t column = at - (line_start == std::string_view::npos ? 0 : line_start + 1) + 1;
+        return reader.refuse(fmt::format("line {}, column {}", line, column), "the text is no JSON", "See docs/materials.md for the format.");
+    }
+    return Reader(source).file(document);
+}
+
+Expected<MaterialFile> load_material(const std::filesystem::path& path) {
+    NACRE_TRY(const std::string text, read_text_file(path, largest_file));
+    NACRE_TRY(MaterialFile file, parse_material(text, path.string()));
+    for (std::filesystem::path& image : file.images) image = path.parent_path() / image;
+    if (file.tree.name.empty()) file.tree.name = path.stem().string();
+    return file;
+}
+
+std::string material_text(const MaterialFile& file) {
+    json result{{"nacre_material", 1}};
+    if (!file.tree.name.empty()) result["name"] = file.tree.name;
+    if (file.tree.thin) result["thin"] = true;
+    if (file.tree.surface_thickness != Tree{}.surface_thickness)
+        result["surface_thickness"] = number_json(file.tree.surface_thickness);
+    for (const std::filesystem::path& image : file.images) result["images"].push_back(image.generic_string());
+    if (file.tree.frames != Tree{}.frames) {
+        for (const TangentFrame& frame : file.tree.frames) {
+            json entry = json::object();
+            if (frame.normal_texture.present()) {
+                entry["normal"] = reference_json(frame.normal_texture);
+                if (frame.normal_texture.scale != 1.0f) entry["normal"]["strength"] = number_json(frame.normal_texture.scale);
+            }
+            if (frame.rotation != 0.0f) entry["rotation"] = number_json(frame.rotation);
+            if (frame.rotation_texture.present()) entry["rotation_texture"] = reference_json(frame.rotation_texture);
+            result["frames"].push_back(std::move(entry));
+        }
+    }
+    result["root"] = node_json(file.tree, file.tree.root);
+    return result.dump(2) + "\n";
+}
+
+std::string material_schema() {
+    const json one{{"oneOf", {json{{"type", "number"}}, json{{"const", "infinity"}}}}};
+    json placement{{"image", {{"type", "integer"}, {"minimum", 0}}},
+                   {"uv_set", {{"enum", {0, 1}}}},
+                   {"uv_offset", {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}}},
+                   {"uv_scale", {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}}},
+                   {"uv_rotation", {{"type", "number"}, {"description", "radians"}}}};
+    json texture = placement, normal = placement;
+    texture.update(json{{"channel", {{"enum", {"r", "g", "b", "a"}}}},
+                        {"scale", {{"type", "number"}}},
+                        {"bias", {{"type", "number"}}}});
+    normal["strength"] = json{{"type", "number"}};
+    const json texture_ref{{"$ref", "#/$defs/texture"}};
+    const auto input = [&](json constant) {
+        json with = object_schema({{"value", constant}, {"texture", texture_ref}});
+        return json{{"oneOf", {std::move(constant), std::move(with)}}};
+    };
+    json slab{{"name", {{"type", "string"}}}, {"frame", {{"type", "integer"}, {"minimum", 0}}}};
+    json features = json::array();
+    for (const SlabFeature& feature : slab_features()) features.push_back(feature.name);
+    slab["features"] = json{{"type", "array"}, {"items", {{"enum", features}}}};
+    for (const SlabField& field : slab_fields()) {
+        json bounded{{"type", "number"}, {"minimum", field.minimum}};
+        if (std::isfinite(field.maximum)) bounded["maximum"] = field.maximum;
+        json number = std::isfinite(field.maximum) ? bounded : json{{"oneOf", {bounded, json{{"const", "infinity"}}}}};
+        if (field.channels == 1) {
+            slab[field.name] = input(number);
+        } else {
+            slab[field.name] = input(json{
+                {"oneOf", {number, json{{"type", "array"}, {"items", number}, {"minItems", 3}, {"maxItems", 3}}}}});
+        }
+    }
+    const json node{{"$ref", "#/$defs/node"}}, name{{"type", "string"}}, yes{{"type", "boolean"}};
+    const json amount = input(json{{"type", "number"}, {"minimum", 0}, {"maximum", 1}});
+    const auto only = [](const char* kind, json body) {
+        json result = object_schema(json::object(), json::array({kind}));
+        result["properties"][kind] = std::move(body);
+        return result;
+    };
+    json kinds = json::array();
+    kinds.push_back(only("slab", object_schema(std::move(slab))));
+    kinds.push_back(only("mix", object_schema({{"name", name}, {"first", node}, {"second", node}, {"amount", amount},
+                                               {"parameter_blend", yes}},
+                                              json::array({"first", "second", "amount"}))));
+    kinds.push_back(only("layer", object_schema({{"name", name}, {"top", node}, {"base", node}, {"thickness", one},
+                                                 {"parameter_blend", yes}},
+                                                json::array({"top", "base"}))));
+    kinds.push_back(only("coverage", object_schema({{"name", name}, {"of", node}, {"amount", amount}}, json::array({"of", "amount"}))));
+    json schema = object_schema({{"$schema", {{"type", "string"}}},
+                                 {"nacre_material", {{"const", 1}}},
+                                 {"name", name},
+                                 {"thin", yes},
+                                 {"surface_thickness", one},
+                                 {"images", {{"type", "array"}, {"items", {{"type", "string"}}}}},
+                                 {"frames", {{"type", "array"}, {"minItems", 1},
+                                             {"items", object_schema({{"normal", object_schema(std::move(normal), json::array({"image"}))},
+                                                                      {"rotation", {{"type", "number"}}},
+                                                                      {"rotation_texture", object_schema(placement, json::array({"image"}))}})}}},
+                                 {"root", node}},
+                                json::array({"nacre_material", "root"}));
+    schema["$defs"] = json{{"node", {{"oneOf", std::move(kinds)}}}, {"texture", object_schema(std::move(texture), json::array({"image"}))}};
+    json result{{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", "Material of Nacre"}};
+    result.update(schema);
+    return result.dump(2) + "\n";
+}
+
+}  // namespace nacre::materials
