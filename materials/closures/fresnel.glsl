@@ -21,15 +21,18 @@ Fresnel make_fresnel(vec3 f0, vec3 f90, vec3 f82) {
     float brightest = largest(f90);
     vec3 tint = brightest > 0.0 ? f90 / brightest : vec3(1.0);
     fresnel.grazing = tint * saturated(largest(f0) / smallest_reflectance);
-    // (6/7)^5 and (1/7) (6/7)^6: the two terms where the dip is largest, at c = 1/7.
-    fresnel.dip = (f0 + (fresnel.grazing - f0) * 0.46266436) * (vec3(1.0) - f82) * 17.65132;
+    vec3 rise = fresnel.grazing - f0;
+    // (6/7)^5 and 1 / ((1/7) (6/7)^6): the two terms where the dip is largest, at c = 1/7. The bound keeps the sum from
+    // falling below 0 anywhere: 1 / (c (1 - c)^6) is at least 17.65, 1 / (c (1 - c)) at least 4.
+    fresnel.dip = min((f0 + rise * 0.462664366) * (vec3(1.0) - f82), min(f0, fresnel.grazing) + abs(rise) * 0.226611) * 17.6513846;
     return fresnel;
 }
 
 vec3 fresnel_reflectance(Fresnel fresnel, float cos_theta) {
     float m = saturated(1.0 - cos_theta);
     float m5 = power5(m);
-    return max(fresnel.normal + (fresnel.grazing - fresnel.normal) * m5 - fresnel.dip * (cos_theta * m5 * m), vec3(0.0));
+    vec3 sum = fresnel.normal + (fresnel.grazing - fresnel.normal) * m5 - fresnel.dip * (cos_theta * m5 * m);
+    return max(sum, vec3(0.0));
 }
 
 // Mean over a hemisphere under diffuse light: integral of 2 c F(c).

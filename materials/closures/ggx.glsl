@@ -84,4 +84,10 @@ float ggx_typical_cosine(float cos_theta, float alpha) {
     return min(sqrt(cos_theta * cos_theta + 10.0 * alpha * alpha), 1.0);
 }
 
+// Mean of c (1 - c)^6 over that light if all of it had one c, by the mean of (1 - c)^5.
+float ggx_typical_dip(float schlick) {
+    float m = pow(max(schlick, 1e-30), 0.2);
+    return (1.0 - m) * schlick * m;
+}
+
 #endif

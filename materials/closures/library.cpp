@@ -8,14 +8,14 @@
 namespace nacre::materials::closures {
 
 Lobes::vec4 Library::interface_table(vec2 at) {
-    constexpr int last = static_cast<int>(interface_table_size) - 1;
+    constexpr int columns = interface_table_columns, rows = interface_table_rows;
     const auto words = materials::interface_table();
     const auto entry = [&](int column, int row) {
-        const std::uint16_t* word = &words[4 * static_cast<std::size_t>(row * (last + 1) + column)];
+        const std::uint16_t* word = &words[4 * static_cast<std::size_t>(row * columns + column)];
         return vec4(word[0], word[1], word[2], word[3]) / 65535.0;
     };
-    const double x = std::clamp(at.x, 0.0, 1.0) * last, y = std::clamp(at.y, 0.0, 1.0) * last;
-    const int column = std::min(static_cast<int>(x), last - 1), row = std::min(static_cast<int>(y), last - 1);
+    const double x = std::clamp(at.x, 0.0, 1.0) * (columns - 1), y = std::clamp(at.y, 0.0, 1.0) * (rows - 1);
+    const int column = std::min(static_cast<int>(x), columns - 2), row = std::min(static_cast<int>(y), rows - 2);
     return glm::mix(glm::mix(entry(column, row), entry(column + 1, row), x - column),
                     glm::mix(entry(column, row + 1), entry(column + 1, row + 1), x - column), y - row);
 }

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "materials/closures/lobes.h"
-#include "materials/slab.h"
+#include "materials/slab.h"  // has the features that the text below asks for
 
 /// @file
 /// The closures of materials/closures/closure.glsl as C++ in double precision, from the same text and with the same tables: the

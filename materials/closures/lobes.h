@@ -34,7 +34,6 @@ struct Lobes {
 // In these files every `const` is a constant outside of functions.
 #define float double
 #define const static constexpr
-#include "materials/closures/features.glsl"
 #include "materials/closures/math.glsl"
 #include "materials/closures/fresnel.glsl"
 #include "materials/closures/ggx.glsl"

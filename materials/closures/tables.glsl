@@ -6,23 +6,25 @@
 // Directional albedos by table. Who includes this has defined
 //
 //     vec4 interface_table(vec2 at)     materials/tables/interface_table.h, bilinear, (0, 0) and (1, 1) being the first and the
-//                                       last entry: a texture's coordinate is (at * 63 + 0.5) / 64
+//                                       last entry: a texture's coordinate is (at * vec2(63, 95) + 0.5) / vec2(64, 96)
 
 // What a GGX lobe with single scattering reflects towards a direction.
 struct GgxAlbedo {
     float total;    // with F = 1
     float schlick;  // mean of (1 - c)^5 over that light
-    float dip;      // mean of c (1 - c)^6 over that light
+    float dip;      // mean of c (1 - c)^6 over that light; only where a slab has an F82
 };
 
 GgxAlbedo ggx_albedo(float cos_theta, float alpha) {
     vec4 entry = interface_table(vec2(ggx_table_coordinate(cos_theta, alpha), sqrt(alpha)));
-    float typical = ggx_typical_cosine(cos_theta, alpha);
-    float m = 1.0 - typical;
     GgxAlbedo albedo;
     albedo.total = entry.x;
-    albedo.schlick = clamp(power5(m) + (entry.y - 0.25) * 0.5, 0.0, 1.0);
-    albedo.dip = max(typical * power6(m) + (entry.z - 0.25) * 0.125, 0.0);
+    albedo.schlick = clamp(power5(1.0 - ggx_typical_cosine(cos_theta, alpha)) + (entry.y - 0.25) * 0.5, 0.0, 1.0);
+#ifdef NACRE_SLAB_F82
+    albedo.dip = max(ggx_typical_dip(albedo.schlick) + (entry.z - 0.75) / 32.0, 0.0);
+#else
+    albedo.dip = 0.0;
+#endif
     return albedo;
 }
 

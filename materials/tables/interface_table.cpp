@@ -7,7 +7,7 @@ namespace {
 constexpr std::uint16_t table[] = {
 #include "materials/tables/interface_table_data.inc"
 };
-static_assert(sizeof(table) == 2 * 4 * interface_table_size * interface_table_size);
+static_assert(sizeof(table) == 2 * 4 * interface_table_columns * interface_table_rows);
 
 }  // namespace
 

@@ -5,8 +5,8 @@
 #include <span>
 
 /// @file
-/// Directional albedos of the lobes of a slab: 64 x 64 entries of four 16-bit words (32 KiB), 65535 being 1. Values lie at the
-/// ends of both ranges, so that entry i stands at i / 63.
+/// Directional albedos of the lobes of a slab: 64 columns, 96 rows of four 16-bit words (48 KiB), 65535 being 1. Values lie at
+/// the ends of both ranges, so that column i stands at i / 63.
 ///
 ///     device.write_texture(table, std::as_bytes(interface_table()));   // Format::rgba16_unorm
 ///
@@ -17,7 +17,7 @@
 /// word | content
 /// 0    | all of it, with F = 1
 /// 1    | 2 (mean of (1 - c)^5 over that light - (1 - b)^5) + 1/4: Schlick's Fresnel
-/// 2    | 8 (mean of c (1 - c)^6 over that light - b (1 - b)^6) + 1/4: the dip at 82 degrees
+/// 2    | 32 (mean of c (1 - c)^6 over that light - (1 - s) s^6) + 3/4: the dip at 82 degrees; s^5 is the mean of word 1
 /// 3    | 32 times what the retro-reflective term of Chan's diffuse model reflects, without its amplitude. Rows: its sharpness,
 ///      | columns: sqrt(mu)
 ///
@@ -25,9 +25,10 @@
 
 namespace nacre::materials {
 
-inline constexpr std::uint32_t interface_table_size = 64;
+inline constexpr std::uint32_t interface_table_columns = 64;
+inline constexpr std::uint32_t interface_table_rows = 96;
 
-/// 4 * 64 * 64 words, row by row.
+/// 4 * 64 * 96 words, row by row.
 [[nodiscard]] std::span<const std::uint16_t> interface_table();
 
 

@@ -81,17 +81,17 @@ inline double chan_retro_albedo(double cosine, double sharpness, int strata) {
 /// The entry of interface_table(), four numbers in [0, 1]. The table was written with 256 strata.
 inline std::array<double, 4> interface_table_entry(std::uint32_t row, std::uint32_t column, int strata) {
     closures::Lobes lobes;
-    const double last = interface_table_size - 1.0;
+    const double at_column = column / (interface_table_columns - 1.0), at_row = row / (interface_table_rows - 1.0);
     // At the ends the entries are limits: of a mirror, and of a view along the surface.
-    const double roughness = std::max(row / last, 2e-3), alpha = roughness * roughness;
-    const double cosine = std::max(lobes.ggx_table_cosine(column / last, alpha), 1e-9);
+    const double roughness = std::max(at_row, 2e-3), alpha = roughness * roughness;
+    const double cosine = std::max(lobes.ggx_table_cosine(at_column, alpha), 1e-9);
     const GgxAlbedo albedo = ggx_albedo(glm::dvec3(std::sqrt(1.0 - cosine * cosine), 0.0, cosine), glm::dvec2(alpha), strata);
     const double typical = lobes.ggx_typical_cosine(cosine, alpha);
-    const double column_cosine = std::max(column / last * (column / last), 1e-9);
+    const double column_cosine = std::max(at_column * at_column, 1e-9);
     return {albedo.total,
             (albedo.schlick / albedo.total - lobes.power5(1.0 - typical)) * 2.0 + 0.25,
-            (albedo.dip / albedo.total - typical * lobes.power6(1.0 - typical)) * 8.0 + 0.25,
-            chan_retro_albedo(column_cosine, lobes.chan_sharpness_at(row / last), std::min(strata, 128)) * 32.0};
+            (albedo.dip / albedo.total - lobes.ggx_typical_dip(albedo.schlick / albedo.total)) * 32.0 + 0.75,
+            chan_retro_albedo(column_cosine, lobes.chan_sharpness_at(at_row), std::min(strata, 128)) * 32.0};
 }
 
 }  // namespace nacre::materials

@@ -27,8 +27,8 @@ class WordWriter {
 void write_interface_table() {
     using namespace nacre::materials;
     WordWriter words;
-    for (std::uint32_t row = 0; row < interface_table_size; ++row) {
-        for (std::uint32_t column = 0; column < interface_table_size; ++column) {
+    for (std::uint32_t row = 0; row < interface_table_rows; ++row) {
+        for (std::uint32_t column = 0; column < interface_table_columns; ++column) {
             for (const double value : interface_table_entry(row, column, 256)) words.write(value);
         }
     }

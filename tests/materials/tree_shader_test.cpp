@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "materials/tree_shader.h"
+
+#include <cmath>
+#include <cstring>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <memory>
+#include <random>
+
+#include "materials/evaluation.h"
+#include "materials/tables/interface_table.h"
+#include "rhi/device.h"
+#include "rhi/shader_compiler.h"
+#include "samples/backends.h"
+#include "tests/materials/random_tree.h"
+
+namespace nacre::materials {
+namespace {
+
+constexpr std::uint32_t pairs = 256;
+
+// Views and lights at all angles; some of them grazing.
+std::vector<glm::vec4> directions(std::mt19937& random) {
+    std::vector<glm::vec4> result;
+    const auto uniform = [&] { return static_cast<float>(random() >> 8) * 0x1p-24f; };
+    for (std::uint32_t i = 0; i < 2 * pairs; ++i) {
+        const float z = i % 8 == 0 ? 0.001f + 0.01f * uniform() : 0.02f + 0.98f * uniform();
+        const float phi = 6.2831853f * uniform(), radius = std::sqrt(1.0f - z * z);
+        result.emplace_back(radius * std::cos(phi), radius * std::sin(phi), z, 0.0f);
+    }
+    return result;
+}
+
+constexpr const char* shader_text = R"(
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 0, std430) readonly buffer Directions { vec4 directions[]; };
+layout(set = 0, binding = 1, std430) readonly buffer Parameters { float parameters[]; };
+layout(set = 0, binding = 2, std430) readonly buffer Table { uint table[]; };
+layout(set = 0, binding = 3, std430) writeonly buffer Results { vec4 results[]; };
+float tree_parameter(uint index) { return parameters[index]; }
+// Textures of the test: four different values.
+vec4 tree_texture(uint index) { return vec4(0.25, 0.5, 0.75, 1.0); }
+vec4 table_entry(uint column, uint row) {
+    uint word = 2u * (row * 64u + column);
+    return vec4(table[word] & 0xffffu, table[word] >> 16, table[word + 1u] & 0xffffu, table[word + 1u] >> 16) / 65535.0;
+}
+vec4 interface_table(vec2 at) {
+    vec2 place = clamp(at, vec2(0.0), vec2(1.0)) * 63.0;
+    uvec2 low = min(uvec2(place), uvec2(62u));
+    vec2 fraction = place - vec2(low);
+    return mix(mix(table_entry(low.x, low.y), table_entry(low.x + 1u, low.y), fraction.x),
+               mix(table_entry(low.x, low.y + 1u), table_entry(low.x + 1u, low.y + 1u), fraction.x), fraction.y);
+}
+)";
+
+constexpr const char* main_text = R"(
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    vec3 views[tree_frame_count];
+    vec3 lights[tree_frame_count];
+    for (uint frame = 0u; frame < tree_frame_count; ++frame) {
+        views[frame] = directions[2u * i].xyz;
+        lights[frame] = directions[2u * i + 1u].xyz;
+    }
+    TreeState state = shade_tree(views, 1e-3);
+    results[2u * i] = vec4(tree_reflected(state, views, lights, 1e-3), state.whole.coverage);
+    results[2u * i + 1u] = vec4(state.whole.view_transmittance, state.top.coverage);
+})";
+
+class TreeShaderTest : public testing::TestWithParam<const char*> {
+  protected:
+    void SetUp() override {
+        static const rhi::Instance instance(all_backends());
+        auto device = instance.create_device({.backend = GetParam()});
+        if (!device && device.error().code == ErrorCode::not_found) GTEST_SKIP() << device.error().message();
+        ASSERT_TRUE(device) << device.error().message();
+        device_ = std::move(*device);
+    }
+
+    Expected<std::vector<glm::vec4>> run(const TreeShader& tree, const std::vector<glm::vec4>& inputs) {
+        rhi::ShaderCompiler compiler({.embedded = {embedded_files()}});
+        NACRE_TRY(const rhi::ShaderDesc text, compiler.compile({.path = "tree.comp", .text = shader_text + tree.glsl + main_text}));
+        NACRE_TRY(const rhi::Shader shader, device_->create_shader(text));
+        NACRE_TRY(const rhi::ComputePipeline pipeline, device_->create_compute_pipeline({.shader = shader, .name = "tree"}));
+        const auto words = interface_table();
+        const auto make = [&](std::size_t size, const void* data, const char* name) -> Expected<rhi::Buffer> {
+            NACRE_TRY(rhi::Buffer buffer, device_->create_buffer({.size = size, .usage = rhi::BufferUsage::storage, .name = name}));
+            if (data != nullptr)
+                NACRE_CHECK(device_->write_buffer(buffer, std::span(static_cast<const std::byte*>(data), size)));
+            return buffer;
+        };
+        NACRE_TRY(const rhi::Buffer directions, make(inputs.size() * sizeof(glm::vec4), inputs.data(), "directions"));
+        NACRE_TRY(const rhi::Buffer parameters, make(tree.parameters.size() * 4, tree.parameters.data(), "parameters"));
+        NACRE_TRY(const rhi::Buffer table, make(words.size_bytes(), words.data(), "table"));
+        NACRE_TRY(const rhi::Buffer results, make(inputs.size() * sizeof(glm::vec4), nullptr, "results"));
+        NACRE_TRY(const rhi::BindGroupLayout layout, device_->bind_group_layout(pipeline, 0));
+        NACRE_TRY(const rhi::BindGroup group,
+                  device_->create_bind_group({.layout = layout,
+                                              .entries = {{.binding = 0, .buffer = directions},
+                                                          {.binding = 1, .buffer = parameters},
+                                                          {.binding = 2, .buffer = table},
+                                                          {.binding = 3, .buffer = results}},
+                                              .name = "tree"}));
+        rhi::CommandList list = device_->create_command_list("tree");
+        list.set_pipeline(pipeline);
+        list.set_bind_group(0, group);
+        list.dispatch({.x = pairs / 64});
+        NACRE_CHECK(device_->submit(std::move(list)));
+        NACRE_TRY(const std::vector<std::byte> bytes, device_->read_buffer(results));
+        std::vector<glm::vec4> values(inputs.size());
+        std::memcpy(values.data(), bytes.data(), bytes.size());
+        return values;
+    }
+
+    // Compares what the device makes of a tree with the host, which counts in doubles.
+    void compare(const FlattenedTree& flat, const FlattenedTree& host_tree, std::mt19937& random) {
+        const std::vector<glm::vec4> inputs = directions(random);
+        const auto results = run(tree_shader(flat), inputs);
+        ASSERT_TRUE(results) << results.error().message();
+        double worst = 0.0;
+        std::uint32_t worst_at = 0;
+        for (std::uint32_t i = 0; i < pairs; ++i) {
+            const glm::dvec3 view = glm::normalize(glm::dvec3(inputs[2 * i])), light = glm::normalize(glm::dvec3(inputs[2 * i + 1]));
+            const ShadedTree shaded = shade(host_tree, view);
+            const glm::dvec3 expected = reflected(shaded, light);
+            for (int channel = 0; channel < 3; ++channel) {
+                const double got = results->at(2 * i)[channel];
+                ASSERT_TRUE(std::isfinite(got) && got >= 0.0) << topology_text(flat.visible_tree);
+                const double error = std::abs(got - expected[channel]) / (expected[channel] + 1e-4);
+                if (error > worst) worst = error, worst_at = i;
+            }
+            EXPECT_NEAR(results->at(2 * i).w, shaded.whole.coverage, 1e-5);
+            EXPECT_NEAR(results->at(2 * i + 1).w, shaded.top.coverage, 1e-5);
+            for (int channel = 0; channel < 3; ++channel)
+                EXPECT_NEAR(results->at(2 * i + 1)[channel], shaded.whole.view_transmittance[channel], 1e-4);
+        }
+        EXPECT_LT(worst, 1e-3) << topology_text(flat.visible_tree) << " view " << inputs[2 * worst_at].z << " light "
+                               << inputs[2 * worst_at + 1].z;
+    }
+
+    std::unique_ptr<rhi::Device> device_;
+};
+
+TEST_P(TreeShaderTest, ShadesAsTheHostDoes) {
+    std::mt19937 random(11);
+    for (std::uint32_t slabs = 1; slabs <= 5; ++slabs) {
+        const Tree tree = random_tree(random, {.slabs = slabs,
+                                               .features = slab_anisotropy | slab_f90 | slab_f82 | slab_second_lobe | slab_fuzz |
+                                                           slab_medium | slab_edge_coverage});
+        const auto flat = flatten(tree);
+        ASSERT_TRUE(flat) << flat.error().message();
+        compare(*flat, *flat, random);
+    }
+}
+
+TEST_P(TreeShaderTest, BlendsAsTheHostDoes) {
+    std::mt19937 random(12);
+    for (const NodeKind kind : {NodeKind::mix, NodeKind::layer}) {
+        Tree tree = random_tree(random, {.slabs = 5, .features = slab_anisotropy | slab_second_lobe | slab_fuzz | slab_medium});
+        for (Node& node : tree.nodes) node.parameter_blend = node.kind == kind;
+        const auto flat = flatten(tree);
+        ASSERT_TRUE(flat);
+        compare(*flat, *flat, random);
+    }
+}
+
+TEST_P(TreeShaderTest, TexturesMultiplyTheirInputs) {
+    Tree tree{.name = "textured"};
+    Slab slab{.roughness = 0.8f, .albedo = {0.5f, 0.25f, 1.0f}};
+    const NodeIndex a = tree.add(slab), b = tree.add(slab);
+    tree.mix(a, b, 0.5f);
+    const TextureReference texture{.image = 0, .sampler = 0};
+    tree.nodes[a].textures = {{.field = "roughness", .texture = texture, .channel = 1},
+                              {.field = "albedo", .texture = texture, .scale = -1.0f, .bias = 1.0f}};
+    tree.nodes[tree.root].textures = {{.field = "amount", .texture = texture, .channel = 2}};
+    Tree plain = tree;  // what that comes to
+    for (Node& node : plain.nodes) node.textures.clear();
+    plain.nodes[a].slab.roughness = 0.4f;
+    plain.nodes[a].slab.albedo = {0.375f, 0.125f, 0.25f};
+    plain.nodes[plain.root].amount = 0.375f;
+    std::mt19937 random(13);
+    compare(*flatten(tree), *flatten(plain), random);
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, TreeShaderTest, testing::Values("cpu:consistent", "vulkan", "gl"),
+                         [](const auto& info) { return std::string(info.param).substr(0, std::string(info.param).find(':')); });
+
+// Materials of one topology share a shader, whatever their numbers are.
+TEST(TreeShader, TextDependsOnTopologyAndFeaturesOnly) {
+    std::mt19937 random(3);
+    Tree tree = random_tree(random, {.slabs = 3, .features = slab_fuzz | slab_medium});
+    for (Node& node : tree.nodes) node.amount = node.kind == NodeKind::layer ? 0.0f : 0.5f;
+    const auto flat = flatten(tree);
+    ASSERT_TRUE(flat);
+    Tree other = tree;
+    for (Node& node : other.nodes) {
+        node.name = "another";
+        node.slab.roughness *= 0.5f;
+        node.slab.albedo = glm::vec3(0.3f);
+        if (node.kind == NodeKind::mix) node.amount = 0.25f;
+    }
+    EXPECT_EQ(tree_shader(*flat).glsl, tree_shader(*flatten(other)).glsl);
+    EXPECT_NE(tree_shader(*flat).parameters, tree_shader(*flatten(other)).parameters);
+    for (Node& node : other.nodes) node.slab.features |= slab_anisotropy;
+    EXPECT_NE(tree_shader(*flat).glsl, tree_shader(*flatten(other)).glsl);
+}
+
+}  // namespace
+}  // namespace nacre::materials
