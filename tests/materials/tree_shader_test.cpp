@@ -42,12 +42,12 @@ float tree_parameter(uint index) { return parameters[index]; }
 // Textures of the test: four different values.
 vec4 tree_texture(uint index) { return vec4(0.25, 0.5, 0.75, 1.0); }
 vec4 table_entry(uint column, uint row) {
-    uint word = 2u * (row * 64u + column);
-    return vec4(table[word] & 0xffffu, table[word] >> 16, table[word + 1u] & 0xffffu, table[word + 1u] >> 16) / 65535.0;
+    uint word = 2u * (row * table_columns + column);
+    return vec4(unpackUnorm2x16(table[word]), unpackUnorm2x16(table[word + 1u]));
 }
 vec4 interface_table(vec2 at) {
-    vec2 place = clamp(at, vec2(0.0), vec2(1.0)) * 63.0;
-    uvec2 low = min(uvec2(place), uvec2(62u));
+    vec2 place = clamp(at, vec2(0.0), vec2(1.0)) * vec2(table_columns - 1u, table_rows - 1u);
+    uvec2 low = min(uvec2(place), uvec2(table_columns, table_rows) - 2u);
     vec2 fraction = place - vec2(low);
     return mix(mix(table_entry(low.x, low.y), table_entry(low.x + 1u, low.y), fraction.x),
                mix(table_entry(low.x, low.y + 1u), table_entry(low.x + 1u, low.y + 1u), fraction.x), fraction.y);
@@ -79,8 +79,10 @@ class TreeShaderTest : public testing::TestWithParam<const char*> {
     }
 
     Expected<std::vector<glm::vec4>> run(const TreeShader& tree, const std::vector<glm::vec4>& inputs) {
+        const std::string table_size = fmt::format("const uint table_columns = {}u, table_rows = {}u;\n", interface_table_columns,
+                                                   interface_table_rows);
         rhi::ShaderCompiler compiler({.embedded = {embedded_files()}});
-        NACRE_TRY(const rhi::ShaderDesc text, compiler.compile({.path = "tree.comp", .text = shader_text + tree.glsl + main_text}));
+        NACRE_TRY(const rhi::ShaderDesc text, compiler.compile({.path = "tree.comp", .text = table_size + shader_text + tree.glsl + main_text}));
         NACRE_TRY(const rhi::Shader shader, device_->create_shader(text));
         NACRE_TRY(const rhi::ComputePipeline pipeline, device_->create_compute_pipeline({.shader = shader, .name = "tree"}));
         const auto words = interface_table();
