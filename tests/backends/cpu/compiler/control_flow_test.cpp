@@ -126,6 +126,14 @@ TEST_P(ControlFlow, AValueOfAnInnerLoopReachesTheNextIterationOfTheOuterOne) {
            });
 }
 
+TEST_P(ControlFlow, WhatWasLoadedInALoopStaysWithThoseWhoLeaveItFirst) {
+    expect("", R"(
+        int loaded = 0, count = 0;
+        do { loaded = n[(id + count) & 63]; } while (count++ < id % 6);
+        r = uint(loaded * 100 + count);)",
+           [](int id) { return static_cast<std::uint32_t>((id + id % 6) % 64 * 100 + id % 6 + 1); });
+}
+
 TEST_P(ControlFlow, AnEarlyReturnOfAFunctionSkipsAStoreToAPrivateVariable) {
     expect(R"(int kept = 3;
         int early(int id, int a) {
