@@ -4,7 +4,8 @@
 //     cpu_differential_test                                        300 shaders with fixed seeds
 //     cpu_differential_test --seed=1000 --count=10000 --folder=/tmp/found
 //     cpu_differential_test --seed=1234 --print                    the text of one shader
-//     cpu_differential_test --seed=1234 --try=changed.glsl         a text of that seed's stage on all devices
+//     cpu_differential_test --seed=1234 --try=changed.glsl         a text of that seed's stage on several devices
+//     cpu_differential_test --seed=1234 --on=cpu,gl --try=changed.glsl
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -17,6 +18,7 @@
 #include <fstream>
 #include <iostream>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -39,6 +41,7 @@ struct Settings {
     int workers = 2;
     std::string folder;   ///< Where shaders go that differ; empty: the test's temporary folder.
     bool reduces = true;
+    std::string devices = "cpu:consistent,cpu:consistent optimized,cpu:fast:lanes=8,cpu:fast:lanes=4,vulkan,gl";  ///< Of --try.
 } settings;
 
 constexpr int most_seconds = 120;  ///< For one shader with its reduction.
@@ -223,6 +226,7 @@ int main(int argc, char** argv) {
         else if (const auto count = value("count")) settings.count = std::strtoull(count->c_str(), nullptr, 10);
         else if (const auto workers = value("workers")) settings.workers = std::max(1, std::atoi(workers->c_str()));
         else if (const auto folder = value("folder")) settings.folder = *folder;
+        else if (const auto devices = value("on")) settings.devices = *devices;
         else if (text == "--no-reduction") settings.reduces = false;
         else if (text == "--print") {
             std::cout << nacre::differential::generate(settings.seed).text;
@@ -233,7 +237,8 @@ int main(int argc, char** argv) {
             std::ifstream file(*path);
             const std::string changed(std::istreambuf_iterator<char>(file), {});
             nacre::differential::Comparison comparison;
-            for (const char* device : {"cpu:consistent", "cpu:consistent optimized", "cpu:fast:lanes=8", "cpu:fast:lanes=4", "vulkan", "gl"}) {
+            std::istringstream devices(settings.devices);
+            for (std::string device; std::getline(devices, device, ',');) {
                 const auto output = comparison.run(device, changed, shader.stage);
                 std::cout << device << ":";
                 for (std::size_t word = 0; output && word < 8; ++word) std::cout << fmt::format(" {:#x}", output->words[word]);
