@@ -534,8 +534,10 @@ void Emitter::emit_edge(std::uint32_t from, Id to, llvm::Value* condition) {
 
     // Where all lanes of the header meet again nothing needs to be counted.
     if (frame->shape->blocks[*target_index].is_reconverged && !is_back) return;
-    // One way in: the mask counts only if the block is reached, so a scalar condition need not clear it.
-    const bool is_plain = !arrival.reached && !may_end && block.predecessors.size() == 1 && condition && !condition->getType()->isVectorTy();
+    // One way in: the mask counts only if the block is reached, so a scalar condition need not clear it. It must where the
+    // block runs whether it is reached or not: of a vector that differs between lanes, one component may be a scalar.
+    const bool is_plain = !arrival.reached && !may_end && block.predecessors.size() == 1 && condition &&
+                          !condition->getType()->isVectorTy() && !is_cheap(*target_index);
     llvm::Value* lanes_coming = is_plain ? mask : edge_mask;
     const bool is_first = !arrival.reached;
     assign(arrival.reached, is_first ? taken : builder.CreateOr(arrival.reached, taken), builder.getFalse(), last_use);

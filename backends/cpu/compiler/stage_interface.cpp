@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/cpu/compiler/stage_interface.h"
 
+#include <algorithm>
+#include <utility>
+
 namespace nacre::cpu {
 namespace {
 
@@ -40,6 +43,18 @@ std::uint32_t append(const Module& module, Id type_id, std::uint32_t location, s
     }
 }
 
+/// First and behind the last of the operands that may be pointers; others may be literals that look like a pointer's id.
+std::pair<std::size_t, std::size_t> pointer_operands(const Instruction& at) {
+    switch (at.op) {
+        case spv::Op::OpVariable: return {0, 0};
+        case spv::Op::OpCopyMemory: return {0, 2};
+        case spv::Op::OpFunctionCall: return {1, at.operands.size()};
+        case spv::Op::OpExtInst: return {2, at.operands.size()};
+        case spv::Op::OpSelect: return {1, 3};
+        default: return {0, 1};  // Of loads, stores, atomic operations, copies.
+    }
+}
+
 }  // namespace
 
 std::optional<std::vector<InterfaceScalar>> interface_scalars(const Module& module, const Variable& variable) {
@@ -63,8 +78,9 @@ bool uses_member(const Module& module, Id variable, std::uint32_t member) {
                     if (at.operand(0) == variable && at.operands.size() > 1 && module.constant_word(at.operand(1)) == member) return true;
                     continue;
                 }
-                for (const std::uint32_t operand : at.operands)
-                    if (operand == variable) return true;
+                const auto [first, end] = pointer_operands(at);
+                for (std::size_t i = first; i < std::min(end, at.operands.size()); ++i)
+                    if (at.operands[i] == variable) return true;
             }
     return false;
 }

@@ -126,6 +126,22 @@ TEST_P(ControlFlow, AValueOfAnInnerLoopReachesTheNextIterationOfTheOuterOne) {
            });
 }
 
+TEST_P(ControlFlow, WhatWasLoadedInALoopStaysWithThoseWhoLeaveItFirst) {
+    expect("", R"(
+        int loaded = 0, count = 0;
+        do { loaded = n[(id + count) & 63]; } while (count++ < id % 6);
+        r = uint(loaded * 100 + count);)",
+           [](int id) { return static_cast<std::uint32_t>((id + id % 6) % 64 * 100 + id % 6 + 1); });
+}
+
+TEST_P(ControlFlow, AComponentThatAllLanesShareMayChooseBetweenValues) {
+    expect("", R"(
+        bvec2 is_zero = equal(gl_GlobalInvocationID.xy, uvec2(0u));
+        r = (is_zero.y ? 5u : 1u + uint(id)) + (is_zero.x ? 100u : 200u);
+        r += is_zero.y ? 1000u + uint(id) : 3000u;)",
+           [](int id) { return static_cast<std::uint32_t>(1005 + id + (id == 0 ? 100 : 200)); });
+}
+
 TEST_P(ControlFlow, AnEarlyReturnOfAFunctionSkipsAStoreToAPrivateVariable) {
     expect(R"(int kept = 3;
         int early(int id, int a) {

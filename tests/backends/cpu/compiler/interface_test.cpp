@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <spirv-tools/libspirv.hpp>
 
 #include "rhi/device.h"
 #include "rhi/shader_compiler.h"
@@ -18,11 +19,10 @@ namespace {
 constexpr std::uint32_t side = 4;
 
 /// Draws one triangle over a target of 4x4 pixels; the words of its pixels.
-Expected<std::vector<std::uint32_t>> draw(const char* spec, const std::string& vertex_text, const std::string& fragment_text) {
+Expected<std::vector<std::uint32_t>> draw(const char* spec, const rhi::ShaderDesc& vertex_words, const std::string& fragment_text) {
     rhi::Instance instance(all_backends());
     NACRE_TRY(auto device, instance.create_device({.backend = spec}));
     rhi::ShaderCompiler compiler({});
-    NACRE_TRY(auto vertex_words, compiler.compile({.path = "interface.vert", .text = vertex_text}));
     NACRE_TRY(auto fragment_words, compiler.compile({.path = "interface.frag", .text = fragment_text}));
     NACRE_TRY(const auto vertex, device->create_shader(vertex_words));
     NACRE_TRY(const auto fragment, device->create_shader(fragment_words));
@@ -43,6 +43,12 @@ Expected<std::vector<std::uint32_t>> draw(const char* spec, const std::string& v
     std::vector<std::uint32_t> words(bytes.size() / 4);
     std::memcpy(words.data(), bytes.data(), bytes.size());
     return words;
+}
+
+Expected<std::vector<std::uint32_t>> draw(const char* spec, const std::string& vertex_text, const std::string& fragment_text) {
+    rhi::ShaderCompiler compiler({});
+    NACRE_TRY(const auto vertex_words, compiler.compile({.path = "interface.vert", .text = vertex_text}));
+    return draw(spec, vertex_words, fragment_text);
 }
 
 const std::string corner = "vec4 corner() { return vec4(float(gl_VertexIndex & 1) * 4.0 - 1.0, float(gl_VertexIndex >> 1) * 4.0 - 1.0, 0.0, 1.0); }\n";
@@ -106,6 +112,65 @@ TEST_P(Interface, ShowsDistancesToTheFragmentStage) {
             EXPECT_EQ(pixel[1], expected_y) << x << " " << y;
             EXPECT_EQ(pixel[2], y < 2 ? 0u : 1u) << x << " " << y;
         }
+}
+
+// The number of the instruction Sqrt is that of the output block's id: none of its distances is written for that.
+TEST(InterfaceOfForeignModules, NumbersThatLookLikeAnOutputDoNotWriteIt) {
+    const char* const text = R"(
+        OpCapability Shader
+        %1 = OpExtInstImport "GLSL.std.450"
+        OpMemoryModel Logical GLSL450
+        OpEntryPoint Vertex %2 "main" %31 %3
+        OpMemberDecorate %20 0 BuiltIn Position
+        OpMemberDecorate %20 1 BuiltIn PointSize
+        OpMemberDecorate %20 2 BuiltIn ClipDistance
+        OpMemberDecorate %20 3 BuiltIn CullDistance
+        OpDecorate %20 Block
+        OpDecorate %3 BuiltIn VertexIndex
+        %4 = OpTypeVoid
+        %5 = OpTypeFunction %4
+        %6 = OpTypeInt 32 1
+        %7 = OpTypeInt 32 0
+        %8 = OpTypeFloat 32
+        %9 = OpTypeVector %8 4
+        %10 = OpConstant %7 1
+        %11 = OpTypeArray %8 %10
+        %20 = OpTypeStruct %9 %8 %11 %11
+        %21 = OpTypePointer Output %20
+        %22 = OpTypePointer Output %9
+        %23 = OpTypePointer Input %6
+        %31 = OpVariable %21 Output
+        %3 = OpVariable %23 Input
+        %40 = OpConstant %6 0
+        %41 = OpConstant %6 1
+        %42 = OpConstant %8 0
+        %43 = OpConstant %8 1
+        %44 = OpConstant %8 4
+        %2 = OpFunction %4 None %5
+        %50 = OpLabel
+        %51 = OpLoad %6 %3
+        %52 = OpBitwiseAnd %6 %51 %41
+        %53 = OpShiftRightArithmetic %6 %51 %41
+        %54 = OpConvertSToF %8 %52
+        %55 = OpConvertSToF %8 %53
+        %56 = OpFMul %8 %54 %44
+        %57 = OpFMul %8 %55 %44
+        %58 = OpFSub %8 %56 %43
+        %59 = OpFSub %8 %57 %43
+        %60 = OpExtInst %8 %1 Sqrt %54
+        %61 = OpFMul %8 %60 %42
+        %62 = OpCompositeConstruct %9 %58 %59 %61 %43
+        %63 = OpAccessChain %22 %31 %40
+        OpStore %63 %62
+        OpReturn
+        OpFunctionEnd)";
+    rhi::ShaderDesc vertex{.stage = rhi::ShaderStage::vertex, .name = "foreign"};
+    spvtools::SpirvTools assembler(SPV_ENV_VULKAN_1_1);
+    ASSERT_TRUE(assembler.Assemble(text, &vertex.spirv, SPV_TEXT_TO_BINARY_OPTION_PRESERVE_NUMERIC_IDS));
+    // Where the distances were taken for written, what is undefined in them would cull the triangle.
+    const auto words = draw("cpu:consistent:hostile", vertex, "layout(location = 0) out uvec4 color; void main() { color = uvec4(5u); }");
+    ASSERT_TRUE(words) << words.error().message();
+    for (const std::uint32_t word : *words) EXPECT_EQ(word, 5u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Lanes, Interface, testing::Values("cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16"),

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <spirv-tools/libspirv.hpp>
 #include <spirv-tools/optimizer.hpp>
 
 #include "rhi/shader_compiler.h"
@@ -74,7 +75,9 @@ std::vector<std::uint32_t> optimized(const std::vector<std::uint32_t>& words) {
     spvtools::OptimizerOptions options;
     options.set_run_validator(false);
     std::vector<std::uint32_t> result;
-    return optimizer.Run(words.data(), words.size(), &result, options) ? result : words;
+    // Now and then the passes leave a module that is no longer valid.
+    const bool is_valid = optimizer.Run(words.data(), words.size(), &result, options) && spvtools::SpirvTools(SPV_ENV_VULKAN_1_1).Validate(result);
+    return is_valid ? result : words;
 }
 
 std::string Output::place_of(std::size_t word, Stage stage) {

@@ -265,7 +265,12 @@ std::string Generator::matrix_expression(const GlslType& type, int depth) {
         }
         case 1: return fmt::format("transpose({})", expression({Kind::matrix, type.columns, type.size}, down));
         case 2: return fold(fmt::format("{} + {}", expression(type, down), expression(type, down)));
-        case 3: return fold(fmt::format("{} * {}", expression({Kind::matrix, type.size, 2}, down), expression({Kind::matrix, 2, type.columns}, down)));
+        case 3: {
+            std::string left = expression({Kind::matrix, type.size, 2}, down);
+            // lavapipe of Mesa 22.3 cannot multiply what comes from two transpositions.
+            if (left.starts_with("transpose(")) left = fold(left);
+            return fold(fmt::format("{} * {}", left, expression({Kind::matrix, 2, type.columns}, down)));
+        }
         case 4: return fold(fmt::format("{} * whole({})", expression(type, down), expression({Kind::real, 1, 1}, down)));
         default:
             return fold(fmt::format("outerProduct(whole({}), whole({}))", expression({Kind::real, type.size, 1}, down),

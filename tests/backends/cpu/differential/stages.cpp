@@ -39,7 +39,8 @@ std::string helpers() {
     for (int columns = 2; columns <= 4; ++columns)
         for (int rows = 2; rows <= 4; ++rows) {
             std::string parts;
-            for (int i = 0; i < columns; ++i) parts += fmt::format("{}whole(x[{}])", i ? ", " : "", i);
+            // Products and sums of such matrices are far from what no int can hold.
+            for (int i = 0; i < columns; ++i) parts += fmt::format("{}vec{}(ivec{}(x[{}]) & 63)", i ? ", " : "", rows, rows, i);
             text += fmt::format("mat{0}x{1} fold(mat{0}x{1} x) {{ return mat{0}x{1}({2}); }}\n", columns, rows, parts);
         }
     return text;
@@ -66,7 +67,7 @@ std::vector<Place> members_of_mixed(const std::string& text, int count, bool wri
 Generator::Generator(std::uint64_t seed) : random_(seed) { shader_.seed = seed; }
 
 void Generator::declarations() {
-    shader_.text = "";
+    shader_.text = std::string(loop_guard) + "\n";
     if (shader_.stage == Stage::compute) {
         struct Size {
             int x, y, z;
@@ -188,8 +189,8 @@ void Generator::function(int number) {
     const bool was_divergent = is_divergent_;
     is_divergent_ = true;
     open(fmt::format("{} {}({})", made.has_result ? made.result.name() : "void", made.name, list));
-    for (const std::string& text : first) line(text);
-    budget_ = random_.between(4, 14);
+    for (const std::string& text : first) line(text + first_value_mark);
+    budget_ = random_.between(3, 7);
     local_variables(random_.between(0, 2));
     const bool pure = made.is_pure;
     structures_.resize(pure ? 0 : structures_.size());
@@ -219,8 +220,8 @@ void Generator::main_function() {
     open("void main()");
     if (shader_.stage == Stage::compute) {
         line("uvec3 grid = gl_WorkGroupID;");
-        line(fmt::format("identity = gl_WorkGroupID.x * {}u + gl_LocalInvocationIndex;", shader_.invocations));
-        line("place = ivec2(identity & 15u, identity >> 4);");
+        line(fmt::format("identity = gl_WorkGroupID.x * {}u + gl_LocalInvocationIndex;{}", shader_.invocations, first_value_mark));
+        line(fmt::format("place = ivec2(identity & 15u, identity >> 4);{}", first_value_mark));
     } else if (shader_.stage == Stage::fragment) {
         line("identity = uint(gl_FragCoord.x) + 16u * uint(gl_FragCoord.y);");
     } else {
@@ -228,12 +229,12 @@ void Generator::main_function() {
         line("gl_Position = vec4((vec2(identity & 15u, identity >> 4) + 0.5) / 8.0 - 1.0, 0.5, 1.0);");
         line("gl_PointSize = 1.0;");
     }
-    for (const std::string& text : initial_) line(text);
+    for (const std::string& text : initial_) line(text + first_value_mark);
     if (uses_barriers_) {
-        line("own[gl_LocalInvocationIndex] = reals_block.s[identity % 3u];");
-        line("if (gl_LocalInvocationIndex < 6u) tallies[gl_LocalInvocationIndex] = 1000u * gl_LocalInvocationIndex + 77u;");
-        if (shader_.invocations < 6) line("for (int i = 0; i < 6; ++i) tallies[i] = 55u;");
-        line("barrier();");
+        for (const char* text : {"own[gl_LocalInvocationIndex] = reals_block.s[identity % 3u];", "shown[gl_LocalInvocationIndex] = 99u;",
+                                 "for (int i = 0; i < 6; ++i) if (gl_LocalInvocationIndex == 0u) tallies[i] = 1000u * uint(i) + 77u;",
+                                 "barrier();"})
+            line(text + std::string(first_value_mark));
         for (Place& place : members_of_mixed("own[gl_LocalInvocationIndex]", 1, true, false)) places_.push_back(place);
         structures_.push_back("own[gl_LocalInvocationIndex]");
     }
@@ -248,8 +249,9 @@ void Generator::main_function() {
         places_.push_back({.text = "items[identity].z", .type = natural(2)});
     }
     const std::size_t first_local = places_.size();
-    local_variables(random_.between(3, 6));
-    budget_ = random_.between(12, 40);
+    local_variables(random_.between(2, 4));
+    // Most are short, since compilers take their time by the line; a few are not.
+    budget_ = random_.chance(95) ? random_.between(5, 15) : random_.between(20, 40);
     depth_ = 0;
     ++depth_;
     while (budget_ > 0) statement();

@@ -181,7 +181,7 @@ void Generator::loop_statement() {
         const std::string again = random_.chance(50) ? fmt::format("{}++ < {}", counter, bound)
                                                      : fmt::format("{}++ < {} && {}", counter, most, expression(one_bool, 2));
         if (form == 2) open(fmt::format("while ({})", again));
-        else open("do");
+        else open("do"), line("loop_guard");
         block(random_.between(1, 4));
         close(form == 2 ? "}" : fmt::format("}} while ({});", again));
         // The counter stays: what it held when the loop was left.
@@ -289,9 +289,9 @@ void Generator::call_statement() {
 /// Invocations of a workgroup show each other a value.
 void Generator::exchange() {
     if (is_divergent_ || !uses_barriers_ || current_) return note();
-    line("barrier();");
+    line(std::string("barrier();") + first_value_mark);
     line(fmt::format("shown[gl_LocalInvocationIndex] = {};", expression(one_uint, 2)));
-    line("barrier();");
+    line(std::string("barrier();") + first_value_mark);
     line(fmt::format("hash = (hash ^ shown[(gl_LocalInvocationIndex + {}u) % {}u]) * 16777619u;", random_.between(1, 20), shader_.invocations));
 }
 
