@@ -48,8 +48,8 @@ struct Slab {
     /// slab_f90. Color of the reflection at grazing incidence, [0, 1]. Only its color counts: it is scaled until its
     /// largest channel is 1, so that it never takes energy away. Black counts as white.
     glm::vec3 f90{1.0f};
-    /// slab_f82. Reflectance at 82 degrees relative to what Schlick's formula gives there, [0, 1]; 1 changes nothing. What would
-    /// make the reflectance negative at some angle (values near 0 on dark interfaces) is limited.
+    /// slab_f82. Reflectance at 82 degrees relative to what Schlick's formula gives there, [0, 1]; 1 changes nothing. Below
+    /// 0.01, and where the reflectance would turn negative at some angle (on dark interfaces), it is limited.
     glm::vec3 f82{1.0f};
 
     /// slab_second_lobe. Perceptual roughness of a second GGX lobe with the same reflectance, [0, 1].

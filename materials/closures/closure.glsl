@@ -55,6 +55,7 @@ struct SpecularLobe {
     float view_length;
     vec3 scale;      // on single scattering: compensation for multiple scattering, share of the lobe, what fuzz lets through
     vec3 albedo;     // scale included
+    vec3 passed;     // 1 - albedo of the lobe alone, with all its digits
     bool is_mirror;
 };
 
@@ -88,13 +89,18 @@ SpecularLobe make_specular_lobe(Fresnel fresnel, vec3 view, float roughness, flo
     if (lobe.is_mirror) {
         lobe.scale = vec3(1.0);
         lobe.albedo = fresnel_reflectance(fresnel, view.z);
+        lobe.passed = fresnel_transmittance(fresnel, view.z);
         return lobe;
     }
     float alpha = sqrt(0.5 * dot(lobe.alpha, lobe.alpha));
     GgxAlbedo albedo = ggx_albedo(min(view.z, 1.0), alpha);
-    lobe.scale = vec3(1.0) + fresnel_mean(fresnel) * ((1.0 - albedo.total) / albedo.total);
-    vec3 single = fresnel.normal + (fresnel.grazing - fresnel.normal) * albedo.schlick - fresnel.dip * albedo.dip;
-    lobe.albedo = clamp(single * albedo.total * lobe.scale, vec3(0.0), vec3(1.0));
+    vec3 mean = fresnel_mean(fresnel);
+    vec3 single = fresnel.normal * (1.0 - albedo.schlick) + fresnel.grazing * albedo.schlick - fresnel.dip * albedo.dip;
+    vec3 not_single = (vec3(1.0) - fresnel.normal) * (1.0 - albedo.schlick) +
+                      (vec3(1.0) - fresnel.grazing) * albedo.schlick + fresnel.dip * albedo.dip;
+    lobe.scale = vec3(1.0) + mean * (albedo.missing / (1.0 - albedo.missing));
+    lobe.albedo = max(single, vec3(0.0)) * (1.0 - albedo.missing) * lobe.scale;
+    lobe.passed = not_single + max(single, vec3(0.0)) * fresnel_mean_transmittance(fresnel) * albedo.missing;
     return lobe;
 }
 
@@ -120,7 +126,7 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 #endif
     closure.fresnel = slab_fresnel(slab);
     closure.specular = make_specular_lobe(closure.fresnel, closure.view, slab.roughness, anisotropy);
-    vec3 interface_albedo = closure.specular.albedo;
+    vec3 passed = closure.specular.passed;
 #ifdef NACRE_SLAB_SECOND_LOBE
     closure.second_probability = 0.0;
     if ((slab.features & slab_second_lobe) != 0u) {
@@ -129,7 +135,7 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
         closure.specular.albedo *= 1.0 - slab.second_weight;
         closure.second.scale *= slab.second_weight;
         closure.second.albedo *= slab.second_weight;
-        interface_albedo = closure.specular.albedo + closure.second.albedo;
+        passed = mix(closure.specular.passed, closure.second.passed, slab.second_weight);
         closure.second_probability = largest(closure.second.albedo);
     }
 #endif
@@ -152,7 +158,7 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
     }
 #endif
     closure.gloss = chan_gloss(slab.roughness);
-    closure.diffuse = slab.albedo * (vec3(1.0) - interface_albedo) * uncovered;
+    closure.diffuse = slab.albedo * passed * uncovered;
     closure.diffuse_scale = 1.0 / chan_albedo_by_table(min(closure.view.z, 1.0), closure.gloss);
     closure.specular_probability = largest(closure.specular.albedo);
     closure.diffuse_probability = largest(closure.diffuse);

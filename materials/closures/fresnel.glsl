@@ -23,21 +23,39 @@ Fresnel make_fresnel(vec3 f0, vec3 f90, vec3 f82) {
     fresnel.grazing = tint * saturated(largest(f0) / smallest_reflectance);
     vec3 rise = fresnel.grazing - f0;
     // (6/7)^5 and 1 / ((1/7) (6/7)^6): the two terms where the dip is largest, at c = 1/7. The bound keeps the sum from
-    // falling below 0 anywhere: 1 / (c (1 - c)^6) is at least 17.65, 1 / (c (1 - c)) at least 4.
-    fresnel.dip = min((f0 + rise * 0.462664366) * (vec3(1.0) - f82), min(f0, fresnel.grazing) + abs(rise) * 0.226611) * 17.6513846;
+    // falling below 0 anywhere: 1 / (c (1 - c)^6) is at least 17.65, 1 / (c (1 - c)) at least 4. A hundredth is always left:
+    // 32 bits cannot tell what is less.
+    fresnel.dip = min((f0 + rise * 0.462664366) * min(vec3(1.0) - f82, vec3(0.99)),
+                      0.99 * (min(f0, fresnel.grazing) + abs(rise) * 0.226611)) * 17.6513846;
     return fresnel;
 }
 
+// 1 - (1 - c)^5, without the loss of digits near 0.
+float schlick_rest(float c, float m) { return c * (1.0 + m * (1.0 + m * (1.0 + m * (1.0 + m)))); }
+
 vec3 fresnel_reflectance(Fresnel fresnel, float cos_theta) {
-    float m = saturated(1.0 - cos_theta);
+    float c = saturated(cos_theta);
+    float m = 1.0 - c;
     float m5 = power5(m);
-    vec3 sum = fresnel.normal + (fresnel.grazing - fresnel.normal) * m5 - fresnel.dip * (cos_theta * m5 * m);
-    return max(sum, vec3(0.0));
+    return fresnel.normal * schlick_rest(c, m) + fresnel.grazing * m5 - fresnel.dip * (c * m5 * m);
+}
+
+// 1 - fresnel_reflectance, with all digits where that is near 1.
+vec3 fresnel_transmittance(Fresnel fresnel, float cos_theta) {
+    float c = saturated(cos_theta);
+    float m = 1.0 - c;
+    float m5 = power5(m);
+    return (vec3(1.0) - fresnel.normal) * schlick_rest(c, m) + (vec3(1.0) - fresnel.grazing) * m5 + fresnel.dip * (c * m5 * m);
 }
 
 // Mean over a hemisphere under diffuse light: integral of 2 c F(c).
 vec3 fresnel_mean(Fresnel fresnel) {
     return max(fresnel.normal + (fresnel.grazing - fresnel.normal) / 21.0 - fresnel.dip / 126.0, vec3(0.0));
+}
+
+// 1 - fresnel_mean.
+vec3 fresnel_mean_transmittance(Fresnel fresnel) {
+    return (vec3(1.0) - fresnel.normal) * (20.0 / 21.0) + (vec3(1.0) - fresnel.grazing) / 21.0 + fresnel.dip / 126.0;
 }
 
 // Index of refraction of a dielectric by its reflectance at normal incidence, and back. An index above 199 (reflectance 0.98)

@@ -10,7 +10,7 @@
 
 // What a GGX lobe with single scattering reflects towards a direction.
 struct GgxAlbedo {
-    float total;    // with F = 1
+    float missing;  // 1 - all of it, with F = 1
     float schlick;  // mean of (1 - c)^5 over that light
     float dip;      // mean of c (1 - c)^6 over that light; only where a slab has an F82
 };
@@ -18,7 +18,7 @@ struct GgxAlbedo {
 GgxAlbedo ggx_albedo(float cos_theta, float alpha) {
     vec4 entry = interface_table(vec2(ggx_table_coordinate(cos_theta, alpha), sqrt(alpha)));
     GgxAlbedo albedo;
-    albedo.total = entry.x;
+    albedo.missing = entry.x;
     albedo.schlick = clamp(power5(1.0 - ggx_typical_cosine(cos_theta, alpha)) + (entry.y - 0.25) * 0.5, 0.0, 1.0);
 #ifdef NACRE_SLAB_F82
     albedo.dip = max(ggx_typical_dip(albedo.schlick) + (entry.z - 0.75) / 32.0, 0.0);

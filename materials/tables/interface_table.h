@@ -15,7 +15,7 @@
 /// surface is, most happens where mu and alpha are alike. With b = min(sqrt(mu^2 + 10 alpha^2), 1):
 ///
 /// word | content
-/// 0    | all of it, with F = 1
+/// 0    | what is missing of all of it, with F = 1: small where the surface is smooth, so that no digits are lost
 /// 1    | 2 (mean of (1 - c)^5 over that light - (1 - b)^5) + 1/4: Schlick's Fresnel
 /// 2    | 32 (mean of c (1 - c)^6 over that light - (1 - s) s^6) + 3/4: the dip at 82 degrees; s^5 is the mean of word 1
 /// 3    | 32 times what the retro-reflective term of Chan's diffuse model reflects, without its amplitude. Rows: its sharpness,

@@ -88,7 +88,7 @@ inline std::array<double, 4> interface_table_entry(std::uint32_t row, std::uint3
     const GgxAlbedo albedo = ggx_albedo(glm::dvec3(std::sqrt(1.0 - cosine * cosine), 0.0, cosine), glm::dvec2(alpha), strata);
     const double typical = lobes.ggx_typical_cosine(cosine, alpha);
     const double column_cosine = std::max(at_column * at_column, 1e-9);
-    return {albedo.total,
+    return {1.0 - albedo.total,
             (albedo.schlick / albedo.total - lobes.power5(1.0 - typical)) * 2.0 + 0.25,
             (albedo.dip / albedo.total - lobes.ggx_typical_dip(albedo.schlick / albedo.total)) * 32.0 + 0.75,
             chan_retro_albedo(column_cosine, lobes.chan_sharpness_at(at_row), std::min(strata, 128)) * 32.0};
