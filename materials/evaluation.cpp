@@ -61,6 +61,7 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
     ShadedTree shaded{.whole = matters[topology.whole], .top = matters[topology.top]};
     for (const TopologyClosure& closure : topology.closures) {
         ShadedClosure result{.node = closure.node, .slab = slabs[closure.slab], .path = paths[closure.path]};
+        result.slab.features &= closure.features;
         result.slab.roughness = library.tracked_roughness(result.slab.roughness, result.path.variance);
         result.closure = library.prepare_closure(result.slab, view, footprint);
         result.coverage = library.slab_coverage(result.slab, view.z);

@@ -18,7 +18,6 @@ class Flattener {
         topology_.top = top_matter(tree_.root);
         hand_down(tree_.root, 0, true, true);
         for (const TopologyClosure& closure : topology_.closures) {
-            topology_.features |= closure.features;
             if (std::ranges::find(topology_.frames, closure.frame) == topology_.frames.end())
                 topology_.frames.push_back(closure.frame);
         }
@@ -66,7 +65,9 @@ class Flattener {
         if (node.kind == NodeKind::slab) {
             topology_.slabs.push_back(index);
             topology_.thickness.push_back(state.thickness);
-            state.features = node.slab.features & ~desc_.dropped_features;
+            // What lies below a medium is seen through it even where the closure that stands for both has none.
+            state.features = node.slab.features & ~(desc_.dropped_features & ~slab_medium);
+            topology_.features |= state.features;
             state.frame = node.frame;
             state.slab = step({.kind = StepKind::read_slab, .a = static_cast<std::uint32_t>(topology_.slabs.size() - 1)},
                               topology_.slab_registers);
@@ -149,7 +150,7 @@ class Flattener {
                                           .slab = state.slab,
                                           .path = path,
                                           .frame = state.frame,
-                                          .features = state.features,
+                                          .features = state.features & ~desc_.dropped_features,
                                           .is_top = is_top,
                                           .is_bottom = is_bottom});
             return;

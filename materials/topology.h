@@ -67,12 +67,12 @@ struct Topology {
     std::uint32_t slab_registers = 0, matter_registers = 0, path_registers = 1;
     std::uint32_t whole = 0;     ///< Matter of the whole tree: its coverage and transmittance decide how it is blended.
     std::uint32_t top = 0;       ///< Matter of the topmost layer alone.
-    std::uint32_t features = 0;  ///< Union over the closures.
+    std::uint32_t features = 0;  ///< Of all slabs that are read: those that the shader's text must know.
 };
 
 /// What is left out when a tree is flattened.
 struct FlattenDesc {
-    std::uint32_t dropped_features = 0;  ///< Features that no slab may have.
+    std::uint32_t dropped_features = 0;  ///< Features that no closure may have.
 };
 
 /// Flattens `tree` after removing what cannot be seen (without_invisible_slabs); node indices are those of `visible_tree`.

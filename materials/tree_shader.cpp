@@ -177,10 +177,10 @@ class Printer {
         print("    TreeState state;\n    state.whole = matter_{};\n    state.top = matter_{};\n", topology_.whole, topology_.top);
         for (std::size_t i = 0; i < topology_.closures.size(); ++i) {
             const TopologyClosure& closure = topology_.closures[i];
-            print("    state.slabs[{0}] = slab_{1};\n    state.paths[{0}] = path_{2};\n"
+            print("    state.slabs[{0}] = slab_{1};\n    state.slabs[{0}].features = {4}u;\n    state.paths[{0}] = path_{2};\n"
                   "    state.slabs[{0}].roughness = tracked_roughness(slab_{1}.roughness, path_{2}.variance);\n"
                   "    state.coverages[{0}] = slab_coverage(slab_{1}, views[{3}].z);\n",
-                  i, closure.slab, closure.path, frame_slot(closure.frame));
+                  i, closure.slab, closure.path, frame_slot(closure.frame), closure.features);
         }
         print("    return state;\n}}\n");
     }
