@@ -2,6 +2,8 @@
 #include "materials/evaluation.h"
 
 #include <cmath>
+#include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
 
 namespace nacre::materials {
 namespace {
@@ -18,7 +20,14 @@ Library::Slab read_slab(const FlattenedTree& tree, std::uint32_t leaf) {
     return slab;
 }
 
-bool is_white(const glm::dvec3& color) { return color == glm::dvec3(1.0); }
+// A direction of the surface's frame in one that is turned around the normal.
+glm::dvec3 turned(const glm::dvec3& direction, double angle) {
+    if (angle == 0.0) return direction;
+    const double c = std::cos(angle), s = std::sin(angle);
+    return {c * direction.x + s * direction.y, c * direction.y - s * direction.x, direction.z};
+}
+
+bool is_white(const glm::dvec3& color) { return glm::all(glm::greaterThan(color, glm::dvec3(1.0 - 1e-9))); }
 
 }  // namespace
 
@@ -27,6 +36,8 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
     std::vector<Library::Slab> slabs(topology.slab_registers);
     std::vector<Library::Matter> matters(topology.matter_registers);
     std::vector<Library::Path> paths(topology.path_registers);
+    std::vector<Library::Spread> spreads(topology.spread_registers);
+    std::vector<double> variances(topology.variance_registers, 0.0);
     paths[0] = library.open_path();
     for (const Step& step : topology.steps) {
         double amount = step.amount == Step::none ? 0.0 : tree.visible_tree.nodes[topology.amounts[step.amount]].amount;
@@ -45,6 +56,14 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
             case StepKind::layer_slabs:
                 slabs[step.result] = library.layer_slabs(slabs[step.a], slabs[step.b], matters[step.c], matters[step.d]);
                 break;
+            case StepKind::slab_spread: spreads[step.result] = library.slab_spread(slabs[step.a], view.z); break;
+            case StepKind::cover_spread: spreads[step.result] = library.cover_spread(spreads[step.a], amount); break;
+            case StepKind::mix_spread: spreads[step.result] = library.mix_spread(spreads[step.a], spreads[step.b], amount); break;
+            case StepKind::layer_spread: spreads[step.result] = library.layer_spread(spreads[step.a], spreads[step.b]); break;
+            case StepKind::variance_below:
+                variances[step.result] = library.variance_below(variances[step.a], spreads[step.b]);
+                break;
+            case StepKind::track_slab: slabs[step.result] = library.track_slab(slabs[step.a], variances[step.b]); break;
             case StepKind::slab_matter:
                 matters[step.result] = library.slab_matter(slabs[step.a], library.prepare_closure(slabs[step.a], view, footprint));
                 break;
@@ -62,8 +81,8 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
     for (const TopologyClosure& closure : topology.closures) {
         ShadedClosure result{.node = closure.node, .slab = slabs[closure.slab], .path = paths[closure.path]};
         result.slab.features &= closure.features;
-        result.slab.roughness = library.tracked_roughness(result.slab.roughness, result.path.variance);
-        result.closure = library.prepare_closure(result.slab, view, footprint);
+        result.rotation = tree.visible_tree.frames[closure.frame].rotation;
+        result.closure = library.prepare_closure(result.slab, turned(view, result.rotation), footprint);
         result.coverage = library.slab_coverage(result.slab, view.z);
         shaded.closures.push_back(result);
     }
@@ -73,7 +92,7 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
 glm::dvec3 reflected(const ShadedTree& shaded, const glm::dvec3& light) {
     glm::dvec3 sum(0.0);
     for (const ShadedClosure& c : shaded.closures) {
-        const Library::ClosureValue value = library.evaluate_closure(c.closure, light);
+        const Library::ClosureValue value = library.evaluate_closure(c.closure, turned(light, c.rotation));
         sum += (value.specular + value.diffuse + value.subsurface) * c.path.weight * c.coverage *
                library.top_transmittance(c.path, light.z);
     }
@@ -84,22 +103,24 @@ glm::dvec3 directional_albedo(const ShadedTree& shaded, int strata) {
     glm::dvec3 sum(0.0);
     for (const ShadedClosure& c : shaded.closures) {
         const glm::dvec3 weight = c.path.weight * c.coverage;
-        const bool is_clear = is_white(c.path.transmittance) || is_white(c.path.uncovered);
-        if (is_clear) {
-            const Library::ClosureAlbedo albedo = library.closure_albedo(c.closure);
-            sum += weight * (albedo.specular + albedo.fuzz + albedo.diffuse);
+        const Library::ClosureAlbedo lobes = library.closure_albedo(c.closure);
+        const glm::dvec3 albedo = lobes.specular + lobes.fuzz + lobes.diffuse;
+        if (is_white(c.path.transmittance) || is_white(c.path.uncovered)) {
+            sum += weight * albedo;
             continue;
         }
-        glm::dvec3 mean(0.0);
+        glm::dvec3 tinted(0.0), untinted(0.0);
         // Stratified in the direction within a lobe, and evenly spread over the choice of the lobe.
         for (int i = 0; i < strata * strata; ++i) {
             const glm::dvec3 random(std::fmod((i + 0.5) * 0.6180339887498949, 1.0), (i % strata + 0.5) / strata,
                                     (i / strata + 0.5) / strata);
             const Library::ClosureSample sample = library.sample_closure(c.closure, random);
             if (sample.pdf <= 0.0 || sample.direction.z <= 0.0) continue;
-            mean += sample.weight * library.top_transmittance(c.path, sample.direction.z);
+            tinted += sample.weight * library.top_transmittance(c.path, sample.direction.z);
+            untinted += sample.weight;
         }
-        sum += weight * mean / static_cast<double>(strata * strata);
+        // The albedo is known; only the mean transmittance over its light is sampled.
+        sum += weight * albedo * tinted / glm::max(untinted, glm::dvec3(1e-30));
     }
     return sum;
 }

@@ -22,9 +22,10 @@ struct ShadedClosure {
     closures::Library::Closure closure;
     closures::Library::Path path;
     double coverage = 0.0;                     ///< The slab's own, for this view.
+    double rotation = 0.0;                     ///< Radians that its tangent is turned from the surface's (TangentFrame).
 };
 
-/// The tree for one view, in one local frame (z is the normal; frames of the tree's own are not applied).
+/// The tree for one view in the surface's local frame: z is the normal. Normal maps are not applied.
 struct ShadedTree {
     std::vector<ShadedClosure> closures;
     closures::Library::Matter whole;

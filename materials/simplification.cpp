@@ -129,7 +129,10 @@ Expected<Simplification> run(const Tree& tree, const MaterialBudget& budget) {
                 step.what = "blend " + topology_text(part);
             } else {
                 NACRE_TRY(const FlattenedTree flat, flatten(step.tree, step.flatten));
-                if ((flat.topology.features & rule.feature) == 0) break;
+                const bool is_used = std::ranges::any_of(flat.topology.closures, [&](const TopologyClosure& closure) {
+                    return (closure.features & rule.feature) != 0;
+                });
+                if (!is_used) break;
                 step.flatten.dropped_features |= rule.feature;
                 step.what = rule.name;
             }

@@ -14,9 +14,10 @@ class Flattener {
     Topology run() {
         place(tree_.root, false, -1.0f, true);
         gather(tree_.root);
+        track(tree_.root, 0, true);
         topology_.whole = matter(tree_.root, Need::all);
         topology_.top = top_matter(tree_.root);
-        hand_down(tree_.root, 0, true, true);
+        hand_down(tree_.root, 0, Step::none, true, true);
         for (const TopologyClosure& closure : topology_.closures) {
             if (std::ranges::find(topology_.frames, closure.frame) == topology_.frames.end())
                 topology_.frames.push_back(closure.frame);
@@ -30,7 +31,7 @@ class Flattener {
     struct NodeState {
         bool is_one_slab = false;           // a leaf, or blended to one
         std::uint32_t slab = Step::none;    // register, where it is one
-        std::uint32_t base_matter = Step::none, matter = Step::none;
+        std::uint32_t base_matter = Step::none, matter = Step::none, spread = Step::none;
         std::uint32_t amount = Step::none;  // index into Topology::amounts
         std::uint32_t features = 0;
         std::uint32_t frame = 0;
@@ -103,6 +104,38 @@ class Flattener {
         }
     }
 
+    std::uint32_t spread(NodeIndex index) {
+        const Node& node = tree_.nodes[index];
+        NodeState& state = nodes_[index];
+        if (state.spread != Step::none) return state.spread;
+        Step made{};
+        if (state.is_one_slab) made = {.kind = StepKind::slab_spread, .a = state.slab};
+        else if (node.kind == NodeKind::coverage) made = {.kind = StepKind::cover_spread, .a = spread(node.first), .amount = state.amount};
+        else if (node.kind == NodeKind::mix)
+            made = {.kind = StepKind::mix_spread, .a = spread(node.first), .b = spread(node.second), .amount = state.amount};
+        else made = {.kind = StepKind::layer_spread, .a = spread(node.first), .b = spread(node.second)};
+        return state.spread = step(made, topology_.spread_registers);
+    }
+
+    // From the root: slabs below a layer are rougher. Closures are made of what this leaves, so that what they reflect and what
+    // they let through are of one kind.
+    void track(NodeIndex index, std::uint32_t variance, bool is_bottom) {
+        const Node& node = tree_.nodes[index];
+        NodeState& state = nodes_[index];
+        if (state.is_one_slab) {
+            if (variance == 0) return;
+            // Its own spread is that of its interface as it is.
+            if (!is_bottom) spread(index);
+            state.slab = step({.kind = StepKind::track_slab, .a = state.slab, .b = variance}, topology_.slab_registers);
+            return;
+        }
+        track(node.first, variance, is_bottom && node.kind != NodeKind::layer);
+        if (node.kind == NodeKind::coverage) return;
+        if (node.kind == NodeKind::layer)
+            variance = step({.kind = StepKind::variance_below, .a = variance, .b = spread(node.first)}, topology_.variance_registers);
+        track(node.second, variance, is_bottom);
+    }
+
     // The matter of a subtree, made when it is first asked for.
     std::uint32_t matter(NodeIndex index, Need need) {
         const Node& node = tree_.nodes[index];
@@ -142,7 +175,8 @@ class Flattener {
         return matter(index, Need::all);
     }
 
-    void hand_down(NodeIndex index, std::uint32_t path, bool is_top, bool is_bottom) {
+    // `below`: matter of all that lies below the subtree.
+    void hand_down(NodeIndex index, std::uint32_t path, std::uint32_t below, bool is_top, bool is_bottom) {
         const Node& node = tree_.nodes[index];
         const NodeState& state = nodes_[index];
         if (state.is_one_slab) {
@@ -159,25 +193,26 @@ class Flattener {
             case NodeKind::slab: break;
             case NodeKind::coverage:
                 hand_down(node.first, step({.kind = StepKind::path_through_mix, .a = path, .amount = state.amount}, topology_.path_registers),
-                          is_top, is_bottom);
+                          below, is_top, is_bottom);
                 break;
             case NodeKind::mix: {
                 const std::uint32_t first = step(
                     {.kind = StepKind::path_through_mix, .a = path, .amount = state.amount, .complement = true}, topology_.path_registers);
-                hand_down(node.first, first, is_top, is_bottom);
+                hand_down(node.first, first, below, is_top, is_bottom);
                 const std::uint32_t second =
                     step({.kind = StepKind::path_through_mix, .a = path, .amount = state.amount}, topology_.path_registers);
-                hand_down(node.second, second, is_top, is_bottom);
+                hand_down(node.second, second, below, is_top, is_bottom);
                 break;
             }
             case NodeKind::layer: {
-                hand_down(node.first, path, is_top, false);
-                const std::uint32_t below = step({.kind = StepKind::path_through_layer,
-                                                  .a = path,
-                                                  .b = matter(node.first, Need::all),
-                                                  .c = matter(node.second, Need::base)},
-                                                 topology_.path_registers);
-                hand_down(node.second, below, false, is_bottom);
+                std::uint32_t ground = matter(node.second, below == Step::none ? Need::base : Need::all);
+                if (below != Step::none)
+                    ground = step({.kind = StepKind::layer_matter, .a = ground, .b = below}, topology_.matter_registers);
+                hand_down(node.first, path, ground, is_top, false);
+                const std::uint32_t under =
+                    step({.kind = StepKind::path_through_layer, .a = path, .b = matter(node.first, Need::all), .c = ground},
+                         topology_.path_registers);
+                hand_down(node.second, under, below, false, is_bottom);
                 break;
             }
         }

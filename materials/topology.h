@@ -25,6 +25,12 @@ enum class StepKind : std::uint8_t {
     cover_slab,          ///< slab: slab a with its coverage times the amount
     mix_slabs,           ///< slab: a and b blended by the amount
     layer_slabs,         ///< slab: a over b blended to one; matters c (of a) and d (of b) say what is seen
+    slab_spread,         ///< spread: of slab a
+    cover_spread,        ///< spread: a with less coverage
+    mix_spread,          ///< spread: a and b side by side
+    layer_spread,        ///< spread: a over b
+    variance_below,      ///< variance: below spread b, where a is that above it
+    track_slab,          ///< slab: a, as rough as it is seen through variance b
     slab_matter,         ///< matter: of slab a, everything
     base_matter,         ///< matter: of slab a, only what a layer above needs: coverage and albedo
     cover_matter,        ///< matter: a with less coverage
@@ -64,7 +70,10 @@ struct Topology {
     std::vector<NodeIndex> amounts;   ///< Operators that have an amount.
     std::vector<float> thickness;     ///< For each of `slabs`: meters that an operator or the surface gives it, or negative.
     std::vector<std::uint32_t> frames;  ///< Tangent frames that the closures use, each once: indices into Tree::frames.
-    std::uint32_t slab_registers = 0, matter_registers = 0, path_registers = 1;
+    std::uint32_t slab_registers = 0, matter_registers = 0;
+    std::uint32_t path_registers = 1;      ///< Register 0 is the open path.
+    std::uint32_t variance_registers = 1;  ///< Register 0 is none.
+    std::uint32_t spread_registers = 0;
     std::uint32_t whole = 0;     ///< Matter of the whole tree: its coverage and transmittance decide how it is blended.
     std::uint32_t top = 0;       ///< Matter of the topmost layer alone.
     std::uint32_t features = 0;  ///< Of all slabs that are read: those that the shader's text must know.

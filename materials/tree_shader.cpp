@@ -128,7 +128,8 @@ class Printer {
                 const std::uint32_t frame = tree_.visible_tree.nodes[topology_.slabs[step.a]].frame;
                 const std::size_t slot = frame_slot(frame);
                 slots[step.result] = slot < topology_.frames.size() ? slot : 0;
-            } else if (step.kind == StepKind::cover_slab || step.kind == StepKind::mix_slabs || step.kind == StepKind::layer_slabs) {
+            } else if (step.kind == StepKind::cover_slab || step.kind == StepKind::mix_slabs || step.kind == StepKind::layer_slabs ||
+                       step.kind == StepKind::track_slab) {
                 slots[step.result] = slots[step.a];
             }
         }
@@ -139,7 +140,7 @@ class Printer {
         const std::vector<std::size_t> slots = frames_of_slabs();
         print("\nTreeState shade_tree(vec3 views[{}], float footprint) {{\n", topology_.frames.size());
         for (std::size_t i = 0; i < topology_.amounts.size(); ++i) print("    float amount_{0} = tree_amount_{0}();\n", i);
-        print("    Path path_0 = open_path();\n");
+        print("    Path path_0 = open_path();\n    float variance_0 = 0.0;\n");
         for (const Step& step : topology_.steps) {
             const std::string amount = step.amount == Step::none  ? std::string()
                                        : step.complement ? fmt::format("1.0 - amount_{}", step.amount)
@@ -154,6 +155,18 @@ class Printer {
                     print("    Slab slab_{} = layer_slabs(slab_{}, slab_{}, matter_{}, matter_{});\n", step.result, step.a, step.b, step.c,
                           step.d);
                     break;
+                case StepKind::slab_spread: print("    Spread spread_{} = slab_spread(slab_{}, views[{}].z);\n", step.result, step.a, slots[step.a]); break;
+                case StepKind::cover_spread: print("    Spread spread_{} = cover_spread(spread_{}, {});\n", step.result, step.a, amount); break;
+                case StepKind::mix_spread:
+                    print("    Spread spread_{} = mix_spread(spread_{}, spread_{}, {});\n", step.result, step.a, step.b, amount);
+                    break;
+                case StepKind::layer_spread:
+                    print("    Spread spread_{} = layer_spread(spread_{}, spread_{});\n", step.result, step.a, step.b);
+                    break;
+                case StepKind::variance_below:
+                    print("    float variance_{} = variance_below(variance_{}, spread_{});\n", step.result, step.a, step.b);
+                    break;
+                case StepKind::track_slab: print("    Slab slab_{} = track_slab(slab_{}, variance_{});\n", step.result, step.a, step.b); break;
                 case StepKind::slab_matter:
                     print("    Matter matter_{0} = slab_matter(slab_{1}, prepare_closure(slab_{1}, views[{2}], footprint));\n", step.result,
                           step.a, slots[step.a]);
@@ -178,7 +191,6 @@ class Printer {
         for (std::size_t i = 0; i < topology_.closures.size(); ++i) {
             const TopologyClosure& closure = topology_.closures[i];
             print("    state.slabs[{0}] = slab_{1};\n    state.slabs[{0}].features = {4}u;\n    state.paths[{0}] = path_{2};\n"
-                  "    state.slabs[{0}].roughness = tracked_roughness(slab_{1}.roughness, path_{2}.variance);\n"
                   "    state.coverages[{0}] = slab_coverage(slab_{1}, views[{3}].z);\n",
                   i, closure.slab, closure.path, frame_slot(closure.frame), closure.features);
         }

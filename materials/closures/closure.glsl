@@ -9,6 +9,9 @@
 #ifdef NACRE_SLAB_FUZZ
 #include "materials/closures/fuzz.glsl"
 #endif
+#ifdef NACRE_SLAB_MEDIUM
+#include "materials/closures/medium.glsl"
+#endif
 // A slab seen from one direction: everything that depends on slab and view is computed once, lights follow.
 //
 // All vectors are unit and in the local frame: z is the normal, x the tangent, y the bitangent; they point away from the
@@ -23,6 +26,7 @@
 //     ClosureAlbedo closure_albedo(Closure closure)                   towards the view, under white light from everywhere
 //     vec3 closure_transmittance(Closure closure, float cos_theta)    straight through the medium, from an outer direction
 //     vec3 closure_throughput(Closure closure)                        view: through fuzz, interface and medium, to what is below
+//     float slab_coverage(Slab slab, float cos_theta)                 where a slab may have slab_edge_coverage
 //     vec3 internal_reflectance(Slab slab)                            of diffuse light that hits the interface from below
 //     vec3 bounce_factor(vec3 internal, vec3 base_albedo)             (1 - K) / (1 - E_b K)
 //
@@ -73,8 +77,17 @@ struct Closure {
     SheenMap fuzz_map;
     float fuzz_probability;
 #endif
+#ifdef NACRE_SLAB_MEDIUM
+    vec3 subsurface;    // albedo of what leaves beyond the footprint
+    vec3 thin;          // albedo of what a medium that is not opaque scatters back
+    vec3 transmission;  // what it scatters through
+    vec3 straight;      // what passes it without an event
+    vec3 depth;         // optical, along the normal
+    float reflectance;  // of the interface at normal incidence, mean of the channels: tells how directions refract
+    float transmission_probability;
+#endif
     float gloss;
-    vec3 diffuse;  // albedo
+    vec3 diffuse;         // albedo of what leaves where it entered
     float diffuse_scale;  // one over the albedo of the diffuse lobe as it is
     float specular_probability;
     float diffuse_probability;
@@ -158,16 +171,45 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
     }
 #endif
     closure.gloss = chan_gloss(slab.roughness);
-    closure.diffuse = slab.albedo * passed * uncovered;
+    vec3 entering = passed * uncovered;
+    closure.diffuse = slab.albedo * entering;
     closure.diffuse_scale = 1.0 / chan_albedo_by_table(min(closure.view.z, 1.0), closure.gloss);
     closure.specular_probability = largest(closure.specular.albedo);
-    closure.diffuse_probability = largest(closure.diffuse);
+    vec3 diffuse = closure.diffuse;
+#ifdef NACRE_SLAB_MEDIUM
+    closure.transmission_probability = 0.0;
+    if ((slab.features & slab_medium) != 0u) {
+        closure.reflectance = dot(slab.f0, vec3(1.0 / 3.0));
+        closure.depth = vec3(optical_depth(slab.mean_free_path.x, slab.thickness),
+                             optical_depth(slab.mean_free_path.y, slab.thickness),
+                             optical_depth(slab.mean_free_path.z, slab.thickness));
+        float inside = refracted_cosine(closure.view.z, closure.reflectance);
+        Scattering x = medium_scattering(slab.albedo.x, closure.depth.x, slab.phase_anisotropy, inside);
+        Scattering y = medium_scattering(slab.albedo.y, closure.depth.y, slab.phase_anisotropy, inside);
+        Scattering z = medium_scattering(slab.albedo.z, closure.depth.z, slab.phase_anisotropy, inside);
+        vec3 opaque = vec3(x.opaque, y.opaque, z.opaque);
+        vec3 share = vec3(subsurface_share(slab.albedo.x, slab.mean_free_path.x, footprint),
+                          subsurface_share(slab.albedo.y, slab.mean_free_path.y, footprint),
+                          subsurface_share(slab.albedo.z, slab.mean_free_path.z, footprint));
+        diffuse = entering * vec3(x.reflected, y.reflected, z.reflected);
+        closure.thin = diffuse * (vec3(1.0) - opaque);
+        closure.subsurface = diffuse * opaque * share;
+        closure.diffuse = diffuse * opaque * (vec3(1.0) - share);
+        closure.transmission = entering * vec3(x.through, y.through, z.through);
+        closure.straight = entering * vec3(x.straight, y.straight, z.straight);
+        closure.transmission_probability = largest(closure.transmission);
+    }
+#endif
+    closure.diffuse_probability = largest(diffuse);
     float sum = closure.specular_probability + closure.diffuse_probability;
 #ifdef NACRE_SLAB_SECOND_LOBE
     sum += closure.second_probability;
 #endif
 #ifdef NACRE_SLAB_FUZZ
     sum += closure.fuzz_probability;
+#endif
+#ifdef NACRE_SLAB_MEDIUM
+    sum += closure.transmission_probability;
 #endif
     float scale = sum > 0.0 ? 1.0 / sum : 0.0;
     closure.specular_probability *= scale;
@@ -177,6 +219,9 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 #endif
 #ifdef NACRE_SLAB_FUZZ
     closure.fuzz_probability *= scale;
+#endif
+#ifdef NACRE_SLAB_MEDIUM
+    closure.transmission_probability *= scale;
 #endif
     return closure;
 }
@@ -196,6 +241,9 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
     value.specular = vec3(0.0);
     value.diffuse = vec3(0.0);
     value.subsurface = vec3(0.0);
+#ifdef NACRE_SLAB_MEDIUM
+    if (light.z < 0.0 && (closure.features & slab_medium) != 0u) value.diffuse = closure.transmission * (-light.z / pi);
+#endif
     if (light.z <= 0.0) return value;
     vec3 h = half_vector(closure.view, light);
     vec3 lobes = specular_lobe_value(closure.specular, closure.view, light, h);
@@ -207,10 +255,20 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
     if ((closure.features & slab_fuzz) != 0u) value.specular += closure.fuzz * sheen_density(closure.fuzz_map, light);
 #endif
     value.diffuse = closure.diffuse * (closure.diffuse_scale * chan_diffuse(closure.view, light, closure.gloss));
+#ifdef NACRE_SLAB_MEDIUM
+    if ((closure.features & slab_medium) != 0u) {
+        value.diffuse += closure.thin * (light.z / pi);
+        value.subsurface = closure.subsurface * (light.z / pi);
+    }
+#endif
     return value;
 }
 
 float closure_pdf(Closure closure, vec3 light) {
+#ifdef NACRE_SLAB_MEDIUM
+    if (light.z < 0.0 && (closure.features & slab_medium) != 0u)
+        return closure.transmission_probability * (-light.z / pi);
+#endif
     if (light.z <= 0.0) return 0.0;
     vec3 h = half_vector(closure.view, light);
     float pdf = closure.specular_probability * specular_lobe_pdf(closure.specular, closure.view, light, h);
@@ -255,6 +313,19 @@ ClosureSample sample_closure(Closure closure, vec3 random) {
         if (chosen) result.direction = sheen_sample(closure.fuzz_map, random.y, random.z);
     }
 #endif
+#ifdef NACRE_SLAB_MEDIUM
+    if (!chosen && (closure.features & slab_medium) != 0u) {
+        left -= closure.transmission_probability;
+        chosen = left < 0.0;
+        if (chosen) {
+            vec3 above = cosine_direction(random.y, random.z);
+            result.direction = vec3(above.x, above.y, -above.z);
+        }
+    }
+    bool is_through = chosen && result.direction.z < 0.0;
+#else
+    bool is_through = false;
+#endif
 #ifdef NACRE_SLAB_SECOND_LOBE
     if (!chosen && (closure.features & slab_second_lobe) != 0u) {
         left -= closure.second_probability;
@@ -266,7 +337,8 @@ ClosureSample sample_closure(Closure closure, vec3 random) {
     if (!chosen && closure.specular_probability <= 0.0) return result;
     if (!chosen)
         result = sample_specular_lobe(closure.specular, closure.view, closure.specular_probability, random.y, random.z);
-    if (result.is_mirror) return result;
+    // Microfacets also send light below the surface, where it is lost.
+    if (result.is_mirror || (!is_through && result.direction.z <= 0.0)) return result;
     result.pdf = closure_pdf(closure, result.direction);
     if (result.pdf > 0.0) {
         ClosureValue value = evaluate_closure(closure, result.direction);
@@ -287,12 +359,40 @@ ClosureAlbedo closure_albedo(Closure closure) {
 #endif
     albedo.diffuse = closure.diffuse;
     albedo.transmission = vec3(0.0);
+#ifdef NACRE_SLAB_MEDIUM
+    if ((closure.features & slab_medium) != 0u) {
+        albedo.diffuse += closure.thin + closure.subsurface;
+        albedo.transmission = closure.transmission;
+    }
+#endif
     return albedo;
 }
 
-vec3 closure_transmittance(Closure closure, float cos_theta) { return vec3(0.0); }
+vec3 closure_transmittance(Closure closure, float cos_theta) {
+    vec3 transmittance = vec3(0.0);
+#ifdef NACRE_SLAB_MEDIUM
+    if ((closure.features & slab_medium) != 0u)
+        transmittance = exp(-closure.depth / max(refracted_cosine(cos_theta, closure.reflectance), smallest_cosine));
+#endif
+    return transmittance;
+}
 
-vec3 closure_throughput(Closure closure) { return vec3(0.0); }
+vec3 closure_throughput(Closure closure) {
+    vec3 throughput = vec3(0.0);
+#ifdef NACRE_SLAB_MEDIUM
+    if ((closure.features & slab_medium) != 0u) throughput = closure.straight;
+#endif
+    return throughput;
+}
+
+#ifdef NACRE_SLAB_EDGE_COVERAGE
+// Coverage of a slab seen from a cosine to its normal.
+float slab_coverage(Slab slab, float cos_theta) {
+    if ((slab.features & slab_edge_coverage) == 0u) return slab.coverage;
+    float m = 1.0 - saturated(cos_theta);
+    return mix(slab.coverage, slab.edge_coverage, m > 0.0 ? pow(m, slab.edge_exponent) : 0.0);
+}
+#endif
 
 // Of diffuse light that hits the interface from the medium's side: what leaves through a denser medium's surface is what enters
 // it, spread over index^2 times the angle.

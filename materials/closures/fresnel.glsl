@@ -67,10 +67,11 @@ float reflectance_to_ior(float f0) {
 
 float ior_to_reflectance(float ior) { return square((ior - 1.0) / (ior + 1.0)); }
 
-// Cosine of the refracted direction inside a denser medium.
-float refracted_cosine(float cos_theta, float ior) {
-    float sine = sqrt(max(1.0 - cos_theta * cos_theta, 0.0)) / ior;
-    return sqrt(max(1.0 - sine * sine, 0.0));
+// Cosine of the direction inside a denser medium, by its reflectance at normal incidence. Every term is positive: sin^2 / ior^2
+// subtracted from 1 would lose the digits of grazing directions where the medium is hardly denser.
+float refracted_cosine(float cos_theta, float f0) {
+    float root = sqrt(clamp(f0, 0.0, 0.98));
+    return sqrt(4.0 * root + square(cos_theta * (1.0 - root))) / (1.0 + root);
 }
 
 // Reflectance at normal incidence of what lies under a medium of index coat_ior, from its reflectance in air. Exact for

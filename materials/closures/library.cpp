@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "materials/tables/interface_table.h"
+#include "materials/tables/medium_table.h"
 
 namespace nacre::materials::closures {
 
@@ -18,6 +19,23 @@ Lobes::vec4 Library::interface_table(vec2 at) {
     const int column = std::min(static_cast<int>(x), columns - 2), row = std::min(static_cast<int>(y), rows - 2);
     return glm::mix(glm::mix(entry(column, row), entry(column + 1, row), x - column),
                     glm::mix(entry(column, row + 1), entry(column + 1, row + 1), x - column), y - row);
+}
+
+Lobes::vec2 Library::medium_table(vec3 at) {
+    constexpr int columns = medium_table_columns, rows = medium_table_rows, slices = medium_table_slices;
+    const auto words = materials::medium_table();
+    const glm::dvec3 last(columns - 1, rows - 1, slices - 1);
+    const glm::dvec3 place = glm::clamp(at, 0.0, 1.0) * last;
+    const glm::dvec3 entry = glm::min(glm::floor(place), last - 1.0), part = place - entry;
+    vec2 sum(0.0);
+    for (int corner = 0; corner < 8; ++corner) {
+        const glm::ivec3 offset(corner & 1, corner >> 1 & 1, corner >> 2), index = glm::ivec3(entry) + offset;
+        const double weight = (offset.x ? part.x : 1.0 - part.x) * (offset.y ? part.y : 1.0 - part.y) *
+                              (offset.z ? part.z : 1.0 - part.z);
+        const std::uint16_t* word = &words[2 * static_cast<std::size_t>((index.z * rows + index.y) * columns + index.x)];
+        sum += weight * vec2(word[0], word[1]) / 65535.0;
+    }
+    return sum;
 }
 
 Library::Slab Library::slab_of(const materials::Slab& slab) {

@@ -24,7 +24,7 @@ float refraction_variance(float roughness) {
     return into / (1.0 - into) + out_of / (1.0 - out_of);
 }
 
-// Perceptual roughness of a slab as it is seen through what lies above.
+// Perceptual roughness of a slab as it is seen through what adds a variance.
 float tracked_roughness(float roughness, float variance) {
     return variance > 0.0 ? variance_to_roughness(roughness_to_variance(roughness) + variance) : roughness;
 }
@@ -32,6 +32,12 @@ float tracked_roughness(float roughness, float variance) {
 // What the operators of a tree do to the matter they arrange: what is tracked follows Hillaire and de Rousiers, "Authoring
 // Materials that matter", SIGGRAPH 2023; the formulae are ours. Any subtree counts as one piece of matter whose parts lie independently of
 // each other, so that a slab yields one closure whatever is above it.
+
+// How much what is seen through a subtree spreads. Known before any closure is, since closures depend on it.
+struct Spread {
+    float coverage;
+    float variance;  // that the covered share adds to the slopes of what lies below
+};
 
 // A slab, or what stands for a subtree, as what lies below it sees it. The last five are those of the covered share; where
 // nothing is covered they mean nothing.
@@ -41,7 +47,7 @@ struct Matter {
     vec3 view_transmittance;  // of what is seen through it in the view direction: interface, fuzz and medium
     vec3 internal;            // reflectance for diffuse light from below
     vec3 albedo;              // reflectance for diffuse light from above
-    float variance;           // added to the slopes of what is seen through it; refraction_variance
+    vec3 passed;              // of diffuse light from above, what reaches the other side
 };
 
 // How a slab is seen through all that lies above it.
@@ -49,8 +55,51 @@ struct Path {
     vec3 weight;         // of the slab's radiance, without its own coverage
     vec3 uncovered;      // share of `weight` that passes by all matter above, [0, 1]
     vec3 transmittance;  // of the rest for light, along the normal; top_transmittance turns it to the light
-    float variance;      // mean variance that the layers above add
 };
+
+#ifndef NACRE_SLAB_EDGE_COVERAGE
+float slab_coverage(Slab slab, float cos_theta) { return slab.coverage; }
+#endif
+
+Spread slab_spread(Slab slab, float cos_view) {
+    Spread spread;
+    spread.coverage = slab_coverage(slab, cos_view);
+    spread.variance = refraction_variance(slab.roughness);
+    return spread;
+}
+
+Spread cover_spread(Spread spread, float amount) {
+    Spread covered = spread;
+    covered.coverage = spread.coverage * amount;
+    return covered;
+}
+
+Spread mix_spread(Spread a, Spread b, float amount) {
+    Spread spread;
+    spread.coverage = (1.0 - amount) * a.coverage + amount * b.coverage;
+    float sum = (1.0 - amount) * a.coverage * a.variance + amount * b.coverage * b.variance;
+    spread.variance = sum / max(spread.coverage, 1e-30);
+    return spread;
+}
+
+Spread layer_spread(Spread top, Spread base) {
+    Spread spread;
+    spread.coverage = top.coverage + (1.0 - top.coverage) * base.coverage;
+    spread.variance = (top.coverage * top.variance + base.coverage * base.variance) / max(spread.coverage, 1e-30);
+    return spread;
+}
+
+// Variance of what lies below a layer, by that above both.
+float variance_below(float above, Spread top) { return above + top.coverage * top.variance; }
+
+Slab track_slab(Slab slab, float variance) {
+    Slab tracked = slab;
+    tracked.roughness = tracked_roughness(slab.roughness, variance);
+    return tracked;
+}
+
+// Of diffuse light, about half way between its mean cosine and its most frequent one.
+const float mean_cosine = 0.6;
 
 Matter no_matter() {
     Matter m;
@@ -59,7 +108,7 @@ Matter no_matter() {
     m.view_transmittance = vec3(1.0);
     m.internal = vec3(0.0);
     m.albedo = vec3(0.0);
-    m.variance = 0.0;
+    m.passed = vec3(1.0);
     return m;
 }
 
@@ -68,25 +117,35 @@ Path open_path() {
     path.weight = vec3(1.0);
     path.uncovered = vec3(1.0);
     path.transmittance = vec3(1.0);
-    path.variance = 0.0;
     return path;
 }
 
-// Share of the surface that a slab covers as it is seen from an angle.
-float slab_coverage(Slab slab, float cos_view) {
-#ifdef NACRE_SLAB_EDGE_COVERAGE
-    if ((slab.features & slab_edge_coverage) != 0u)
-        return mix(slab.coverage, slab.edge_coverage, pow(max(1.0 - cos_view, 0.0), slab.edge_exponent));
-#endif
-    return slab.coverage;
-}
-
-// What a layer above a slab needs to know of it. The albedo is that under diffuse light.
+// What a layer above a slab needs to know of it: the albedo is that under diffuse light.
 Matter base_matter(Slab slab, float cos_view) {
     Matter m = no_matter();
     m.coverage = slab_coverage(slab, cos_view);
+    vec3 reflected = slab.albedo;
+    vec3 through = vec3(0.0);
+#ifdef NACRE_SLAB_MEDIUM
+    if ((slab.features & slab_medium) != 0u) {
+        float inside = refracted_cosine(mean_cosine, dot(slab.f0, vec3(1.0 / 3.0)));
+        Scattering x = medium_scattering(slab.albedo.x, optical_depth(slab.mean_free_path.x, slab.thickness), slab.phase_anisotropy, inside);
+        Scattering y = medium_scattering(slab.albedo.y, optical_depth(slab.mean_free_path.y, slab.thickness), slab.phase_anisotropy, inside);
+        Scattering z = medium_scattering(slab.albedo.z, optical_depth(slab.mean_free_path.z, slab.thickness), slab.phase_anisotropy, inside);
+        reflected = vec3(x.reflected, y.reflected, z.reflected);
+        through = vec3(x.through + x.straight, y.through + y.straight, z.through + z.straight);
+    }
+#endif
     vec3 mean = fresnel_mean(slab_fresnel(slab));
-    m.albedo = mean + (vec3(1.0) - mean) * slab.albedo;
+    m.albedo = mean + (vec3(1.0) - mean) * reflected;
+    m.passed = (vec3(1.0) - mean) * through;
+#ifdef NACRE_SLAB_FUZZ
+    if ((slab.features & slab_fuzz) != 0u) {
+        float fuzz = slab.fuzz_amount * sheen_albedo(mean_cosine, slab.fuzz_roughness);
+        m.albedo = mix(m.albedo, slab.fuzz_color, fuzz);
+        m.passed *= 1.0 - fuzz;
+    }
+#endif
     return m;
 }
 
@@ -96,7 +155,6 @@ Matter slab_matter(Slab slab, Closure closure) {
     m.transmittance = closure_transmittance(closure, 1.0);
     m.view_transmittance = closure_throughput(closure) + closure_albedo(closure).transmission;
     m.internal = internal_reflectance(slab);
-    m.variance = refraction_variance(slab.roughness);
     return m;
 }
 
@@ -122,7 +180,7 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     m.view_transmittance = mix(a.view_transmittance, b.view_transmittance, share);
     m.internal = mix(a.internal, b.internal, share);
     m.albedo = mix(a.albedo, b.albedo, share);
-    m.variance = mix(a.variance, b.variance, share);
+    m.passed = mix(a.passed, b.passed, share);
     return m;
 }
 
@@ -140,13 +198,14 @@ Matter layer_matter(Matter top, Matter base) {
     m.transmittance = t * top.transmittance + b * base.transmittance + tb * top.transmittance * base.transmittance;
     m.view_transmittance =
         t * top.view_transmittance + b * base.view_transmittance + tb * top.view_transmittance * base.view_transmittance;
-    // Light from below crosses the base, is thrown back by the top, and so on between the two.
-    vec3 through_base = (vec3(1.0) - base.internal) * base.transmittance;
-    vec3 internal = base.internal + through_base * through_base * top.internal / max(vec3(1.0) - base.albedo * top.internal, vec3(1e-6));
-    vec3 albedo = top.albedo + top.view_transmittance * top.transmittance * base.albedo * bounce_factor(top.internal, base.albedo);
+    // Light goes on between the top, from below, and the base, from above.
+    vec3 between = vec3(1.0) / max(vec3(1.0) - base.albedo * top.internal, vec3(1e-6));
+    vec3 internal = base.internal + (vec3(1.0) - base.internal) * base.transmittance * top.internal * base.passed * between;
+    vec3 albedo = top.albedo + top.passed * base.albedo * bounce_factor(top.internal, base.albedo) * top.transmittance;
+    vec3 passed = top.passed * base.passed * between;
     m.internal = t * top.internal + b * base.internal + tb * min(internal, vec3(1.0));
     m.albedo = t * top.albedo + b * base.albedo + tb * min(albedo, vec3(1.0));
-    m.variance = t * top.variance + b * base.variance + tb * (top.variance + base.variance);
+    m.passed = t * top.passed + b * base.passed + tb * min(passed, vec3(1.0));
     return m;
 }
 
@@ -157,8 +216,8 @@ Path path_through_mix(Path path, float amount) {
     return above;
 }
 
-// A path that comes up from the base of a layer under `top`; `base_albedo` is that of the whole base (Matter::albedo): light that
-// is thrown back may hit any part of it.
+// A path that comes up from the base of a layer under `top`; `base_albedo` is that of all that lies below the top, to the
+// bottom of the material (Matter::albedo): light that is thrown back may hit any part of it.
 Path path_through_layer(Path path, Matter top, vec3 base_albedo) {
     vec3 beside = vec3(1.0 - top.coverage);
     vec3 through = top.coverage * top.view_transmittance * bounce_factor(top.internal, base_albedo);
@@ -172,7 +231,6 @@ Path path_through_layer(Path path, Matter top, vec3 base_albedo) {
     // for both is between.
     vec3 kept = mix(path.transmittance, vec3(1.0), path.uncovered) * mix(top.transmittance, vec3(1.0), by);
     above.transmittance = min(max(kept - above.uncovered, vec3(0.0)) / max(vec3(1.0) - above.uncovered, vec3(1e-30)), vec3(1.0));
-    above.variance = path.variance + top.coverage * top.variance;
     return above;
 }
 

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "materials/tables/interface_table_generator.h"
+#include "materials/tables/medium_table_generator.h"
 
 namespace {
 
@@ -34,6 +35,14 @@ void write_interface_table() {
     }
 }
 
+void write_medium_table() {
+    using namespace nacre::materials;
+    WordWriter words;
+    for (std::uint32_t slice = 0; slice < medium_table_slices; ++slice)
+        for (const double value : medium_table_slice(slice)) words.write(value);
+    std::puts("");
+}
+
 }  // namespace
 
 int main(int count, char** arguments) {
@@ -41,8 +50,10 @@ int main(int count, char** arguments) {
     std::puts("// SPDX-License-Identifier: Apache-2.0\n// Written by materials/tables/write_tables.cpp.");
     if (name == "interface") {
         write_interface_table();
+    } else if (name == "medium") {
+        write_medium_table();
     } else {
-        std::fputs("write_tables: name one table: interface\n", stderr);
+        std::fputs("write_tables: name one table: interface, medium\n", stderr);
         return 2;
     }
 }

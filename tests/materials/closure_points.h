@@ -50,15 +50,18 @@ inline const std::vector<double>& roughnesses() {
     return values;
 }
 
-/// What a closure sends towards its view under white light from everywhere: lobe by lobe, each by its own sampler over a
+/// What a closure sends towards its view under white light from everywhere, also from below: lobe by lobe, each by its own sampler over a
 /// stratified grid. `strata` squared samples per lobe; 64 are good for 1e-4.
 inline glm::dvec3 integrate(Library& library, const Library::Closure& closure, int strata) {
     Library::Closure none = closure;
-    none.diffuse = none.fuzz = glm::dvec3(0.0);
+    none.diffuse = none.fuzz = none.thin = none.subsurface = none.transmission = glm::dvec3(0.0);
     none.specular.scale = none.specular.albedo = none.second.scale = none.second.albedo = glm::dvec3(0.0);
     none.diffuse_probability = none.fuzz_probability = none.specular_probability = none.second_probability = 0.0;
-    std::array<Library::Closure, 4> lobes = {none, none, none, none};
+    none.transmission_probability = 0.0;
+    std::array<Library::Closure, 5> lobes = {none, none, none, none, none};
     lobes[0].diffuse = closure.diffuse;
+    lobes[0].thin = closure.thin;
+    lobes[0].subsurface = closure.subsurface;
     lobes[0].diffuse_probability = 1.0;
     lobes[1].specular = closure.specular;
     lobes[1].specular_probability = 1.0;
@@ -66,7 +69,10 @@ inline glm::dvec3 integrate(Library& library, const Library::Closure& closure, i
     lobes[2].fuzz_probability = 1.0;
     lobes[3].second = closure.second;
     lobes[3].second_probability = 1.0;
-    const bool present[] = {true, true, (closure.features & slab_fuzz) != 0, (closure.features & slab_second_lobe) != 0};
+    lobes[4].transmission = closure.transmission;
+    lobes[4].transmission_probability = 1.0;
+    const bool present[] = {true, true, (closure.features & slab_fuzz) != 0, (closure.features & slab_second_lobe) != 0,
+                            (closure.features & slab_medium) != 0};
     glm::dvec3 sum(0.0);
     for (std::size_t lobe = 0; lobe < lobes.size(); ++lobe) {
         if (!present[lobe]) continue;

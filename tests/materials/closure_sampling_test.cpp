@@ -68,7 +68,6 @@ struct Bins {
             lowest = std::min(lowest, z);
             highest = std::max(highest, z);
         }
-        if (highest < -0.1) return 0.0;
         // Densities end at the surface, and some lobes lie along it: midpoints may all miss that.
         const bool is_at_surface = lowest < 0.1 && highest > 0.0 && highest - lowest > 0.02 * highest;
         const double coarse = sum(2), fine = sum(4);
@@ -159,6 +158,9 @@ std::vector<Case> cases() {
     for (const float roughness : {0.1f, 0.4f, 1.0f})
         result.push_back({"fuzz " + std::to_string(roughness),
                           {.features = slab_fuzz, .f0 = glm::vec3(0.0f), .albedo = glm::vec3(0.0f), .fuzz_amount = 1.0f, .fuzz_roughness = roughness}});
+    result.push_back({"thin",
+                      {.features = slab_medium, .f0 = glm::vec3(0.04f), .roughness = 0.4f, .albedo = {0.9f, 0.7f, 0.8f},
+                       .mean_free_path = glm::vec3(1e-3f), .thickness = 1e-3f}});
     result.push_back({"everything",
                       {.features = slab_anisotropy | slab_second_lobe | slab_fuzz, .f0 = {0.5f, 0.2f, 0.1f}, .roughness = 0.3f,
                        .albedo = {0.1f, 0.6f, 0.2f}, .anisotropy = 0.5f, .second_roughness = 0.7f, .second_weight = 0.4f,

@@ -32,7 +32,7 @@ Furnace furnace_of(Slab slab, const std::vector<float>& anisotropies = {0.0f}) {
             for (const double cosine : view_cosines()) {
                 for (const double phi : anisotropies.size() > 1 ? std::vector{0.0, 0.8, 1.5708} : std::vector{0.3}) {
                     const auto closure = library.prepare_closure(Library::slab_of(slab), direction(cosine, phi), 1e-3);
-                    furnace.add(integrate(library, closure, 64) + library.closure_albedo(closure).transmission * 0.0,
+                    furnace.add(integrate(library, closure, 64) + library.closure_throughput(closure),
                                 "roughness " + std::to_string(roughness) + " anisotropy " + std::to_string(anisotropy) +
                                     " cosine " + std::to_string(cosine) + " phi " + std::to_string(phi));
                 }
@@ -69,22 +69,42 @@ TEST(Closure, WhiteDiffuseUnderWhiteFuzzLosesNothing) {
         expect_lossless(furnace_of({.features = slab_fuzz, .f0 = glm::vec3(0.04f), .fuzz_amount = 1.0f, .fuzz_roughness = roughness}));
 }
 
+TEST(Closure, WhiteMediumOfAnyDepthLosesNothing) {
+    for (const float depth : {0.0f, 1e-7f, 1e-3f, 0.1f, 1.0f, 7.0f, 100.0f, 1e5f, 1e12f}) {
+        for (const float phase : {0.0f, 0.8f, -0.8f}) {
+            Slab slab{.features = slab_medium, .f0 = glm::vec3(0.04f), .mean_free_path = glm::vec3(1e-3f)};
+            slab.thickness = depth * 1e-3f;
+            slab.phase_anisotropy = phase;
+            Library library;
+            Furnace furnace;
+            for (const double cosine : view_cosines()) {
+                const auto closure = library.prepare_closure(Library::slab_of(slab), direction(cosine, 0.3), 1e-3);
+                furnace.add(integrate(library, closure, 64) + library.closure_throughput(closure),
+                            "depth " + std::to_string(depth) + " phase " + std::to_string(phase) + " cosine " + std::to_string(cosine));
+            }
+            expect_lossless(furnace);
+        }
+    }
+}
+
 TEST(Closure, NoSlabSendsOutMoreThanItGets) {
     Library library;
     Random random(4);
     for (int i = 0; i < 300; ++i) {
-        Slab slab = random_slab(random, slab_f90 | slab_f82 | slab_second_lobe | slab_fuzz);
+        Slab slab = random_slab(random, slab_f90 | slab_f82 | slab_second_lobe | slab_fuzz | slab_medium);
         const auto closure = library.prepare_closure(Library::slab_of(slab), random_direction(random), 1e-3);
         const glm::dvec3 reflected = integrate(library, closure, 48);
-        ASSERT_LE(std::max({reflected.x, reflected.y, reflected.z}), 1.001) << "point " << i;
+        const glm::dvec3 all = reflected + library.closure_throughput(closure);
+        ASSERT_LE(std::max({all.x, all.y, all.z}), 1.001) << "point " << i;
         // What the closure says it reflects is what it reflects.
         const auto albedo = library.closure_albedo(closure);
-        const glm::dvec3 sum = albedo.specular + albedo.fuzz + albedo.diffuse;
+        const glm::dvec3 sum = albedo.specular + albedo.fuzz + albedo.diffuse + albedo.transmission;
         for (int channel = 0; channel < 3; ++channel) ASSERT_NEAR(sum[channel], reflected[channel], 2e-3) << "point " << i;
     }
 }
 
-constexpr std::uint32_t finished_features = slab_anisotropy | slab_f90 | slab_f82 | slab_second_lobe | slab_fuzz;
+constexpr std::uint32_t finished_features = slab_anisotropy | slab_f90 | slab_f82 | slab_second_lobe | slab_fuzz |
+                                            slab_medium | slab_edge_coverage;
 
 TEST(Closure, SamplesAgreeWithValueAndDensity) {
     Library library;

@@ -4,6 +4,7 @@
 
 #include "materials/tables/interface_table.h"
 #include "materials/tables/interface_table_generator.h"
+#include "materials/tables/medium_table_generator.h"
 #include "tests/materials/closure_points.h"
 
 namespace nacre::materials::test {
@@ -46,6 +47,79 @@ TEST(InterfaceTable, BetweenEntriesTheErrorIsBelowOneIn1000) {
     EXPECT_LT(dip, 6e-5);
     EXPECT_LT(chan, 1e-3);
     std::printf("largest errors: total %.1e, schlick %.1e, dip %.1e, diffuse %.1e\n", total, schlick, dip, chan);
+}
+
+TEST(MediumTable, EntriesAreThoseOfTheGenerator) {
+    for (std::uint32_t slice = 0; slice < medium_table_slices; ++slice) {
+        const std::vector<double> values = medium_table_slice(slice);
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            const double stored = medium_table()[slice * values.size() + i] / 65535.0;
+            ASSERT_NEAR(stored, values[i], 1e-5) << "slice " << slice << " number " << i;
+        }
+    }
+}
+
+/// Reflection of an infinitely thick medium by Chandrasekhar's H function, 1 - sqrt(1 - albedo) H(cosine), which is found as the
+/// fixed point of 1 / H = sqrt(1 - albedo) + albedo / 2 integral of m H(m) / (cosine + m).
+double chandrasekhar(double albedo, double cosine) {
+    constexpr int count = 2000;
+    const auto node = [](int i) { return (i + 0.5) / count; };
+    std::vector<double> h(count, 1.0);
+    const double root = std::sqrt(1.0 - albedo);
+    const auto inverse = [&](double mu) {
+        double sum = 0.0;
+        for (int i = 0; i < count; ++i) sum += node(i) * h[i] / (mu + node(i)) / count;
+        return root + 0.5 * albedo * sum;
+    };
+    // Steps are few: the fixed point is approached by a factor of the albedo at least.
+    for (int step = 0; step < 30; ++step) {
+        std::vector<double> next(count);
+        for (int i = 0; i < count; ++i) next[i] = 1.0 / inverse(node(i));
+        h = std::move(next);
+    }
+    return 1.0 - root / inverse(cosine);
+}
+
+TEST(MediumTable, InfiniteDepthIsChandrasekhars) {
+    const std::vector<double> cosines = {0.1, 0.5, 1.0};
+    for (const double albedo : {0.3, 0.7}) {
+        ScatteringLayer layer(albedo, cosines);
+        layer.start(0x1p-20);
+        while (layer.depth() < 100.0) layer.twice();
+        for (std::size_t i = 0; i < cosines.size(); ++i)
+            EXPECT_NEAR(layer.reflected(i), chandrasekhar(albedo, cosines[i]), 1e-5) << albedo << " " << cosines[i];
+    }
+}
+
+TEST(MediumTable, AThinLayerScattersHalfOfItsLightBack) {
+    ScatteringLayer layer(1.0, {0.3, 1.0});
+    layer.start(0x1p-20);
+    for (int i = 0; i < 10; ++i) layer.twice();
+    EXPECT_NEAR(layer.reflected(0) / (0.5 * layer.depth() / 0.3), 1.0, 2e-2);
+    EXPECT_NEAR(layer.reflected(0) + layer.through(0), layer.interacting(0), 1e-7);
+}
+
+TEST(MediumTable, BetweenEntriesTheErrorIsSmall) {
+    Library library;
+    Random random(8);
+    double reflected = 0.0, through = 0.0;
+    for (int i = 0; i < 150; ++i) {
+        const double albedo = i % 3 == 0 ? 1.0 : random(), cosine = std::max(random(), 0.02);
+        const double similarity = library.medium_similarity(albedo);
+        ScatteringLayer layer(1.0 - similarity * similarity, {cosine});
+        layer.start(std::exp2(random(-31.0, -30.0)));
+        const double depth = std::exp2(random(-8.0, 8.0));
+        while (layer.depth() < depth) layer.twice();
+        const auto scattering = library.medium_scattering(albedo, layer.depth(), 0.0, cosine);
+        // The table's own share, without the turn towards the authored albedo that opaque media take.
+        const auto infinite = library.medium_table({std::sqrt(cosine), 1.0, std::sqrt(similarity)});
+        const double turn = similarity > 0.0 ? std::lerp(1.0, albedo / ((1.0 - similarity * similarity) * infinite.y + 1e-30), scattering.opaque) : 1.0;
+        reflected = std::max(reflected, std::abs(scattering.reflected / turn - layer.reflected(0)));
+        through = std::max(through, std::abs(scattering.through - layer.through(0)));
+    }
+    EXPECT_LT(reflected, 0.003);
+    EXPECT_LT(through, 0.003);
+    std::printf("largest errors: reflected %.1e, through %.1e\n", reflected, through);
 }
 
 }  // namespace

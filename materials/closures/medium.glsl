@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef NACRE_CLOSURES_MEDIUM
+#define NACRE_CLOSURES_MEDIUM
+#include "materials/closures/math.glsl"
+// A layer of a scattering and absorbing medium between two planes, from opaque to empty. Who includes this has defined
+//
+//     vec2 medium_table(vec3 at)    materials/tables/medium_table.h, trilinear, (0, 0, 0) and (1, 1, 1) being the first and the
+//                                   last entry
+
+// Lengths that are divided stay between these: meters.
+const float shortest_length = 1e-12;
+const float longest_length = 1e12;
+
+// The similarity parameter sqrt((1 - w) / (1 - w g)), w being the albedo of a single scattering and g the phase anisotropy, of
+// a medium that reflects `albedo` if it is infinitely thick, and back. 0: nothing is absorbed, 1: nothing is scattered.
+// Source: van de Hulst 1980, in the form of Kulla and Conty 2017; round trip within 2e-5.
+float medium_similarity(float albedo) {
+    float root = sqrt(9.59217 + albedo * (41.6808 + albedo * 17.7126));
+    // 4.09712 + 4.20863 albedo - root, multiplied out so that the ends are exact and no digits cancel.
+    return clamp(7.19424 * (1.0 - albedo) / (4.09712 + 4.20863 * albedo + root), 0.0, 1.0);
+}
+
+// 1 - medium_similarity, with all digits where that is near 1: the same fit multiplied out from the other end.
+float medium_dissimilarity(float albedo) {
+    float root = sqrt(9.59217 + albedo * (41.6808 + albedo * 17.7126));
+    float rise = (41.6808 + 17.7126 * albedo) / (root + 3.0971232);
+    return clamp(albedo * (rise + 11.40287) / (4.09712 + 4.20863 * albedo + root), 0.0, 1.0);
+}
+
+float medium_albedo(float similarity) {
+    return (1.0 - similarity) * (1.0 - 0.139 * similarity) / (1.0 + 1.17 * similarity);
+}
+
+// Albedo of a single scattering.
+float scattering_albedo(float similarity, float phase_anisotropy) {
+    float s2 = similarity * similarity;
+    return (1.0 - s2) / (1.0 - phase_anisotropy * s2);
+}
+
+// Mean free path in a medium that lets `transmittance` through `distance`, both in any range; and back.
+float transmittance_to_mean_free_path(float transmittance, float distance) {
+    float depth = -log(clamp(transmittance, 1e-30, 1.0));
+    return clamp(distance / max(depth, 1e-24), 0.0, longest_length);
+}
+
+float optical_depth(float mean_free_path, float distance) {
+    return clamp(distance, 0.0, longest_length) / clamp(mean_free_path, shortest_length, longest_length);
+}
+
+float medium_transmittance(float mean_free_path, float distance) { return exp(-optical_depth(mean_free_path, distance)); }
+
+// 1 - exp(-x), with all digits where x is small.
+float interacting(float x) { return x < 0.01 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x); }
+
+// What becomes of light that enters the layer.
+struct Scattering {
+    float reflected;
+    float through;   // scattered, out of the far side
+    float straight;  // out of the far side without an event
+    float opaque;    // how much of `reflected` is that of an infinitely thick medium, [0, 1]
+};
+
+// Rows of the table: optical depths 2^-8 to 2^12.
+float medium_table_row(float depth) { return saturated((log2(clamp(depth, 1e-6, 1e6)) + 8.0) / 20.0); }
+
+// cosine: inside the medium. Directions of scattering are not told apart: a phase function g counts as the isotropic one whose
+// depth is scaled by 1 - w g (van de Hulst's similarity). Nothing is lost where nothing is absorbed.
+Scattering medium_scattering(float albedo, float depth, float phase_anisotropy, float cosine) {
+    Scattering result;
+    float similarity = medium_similarity(albedo);
+    float dissimilarity = medium_dissimilarity(albedo);
+    float single = dissimilarity * (2.0 - dissimilarity);
+    float inverse = 1.0 / (1.0 - phase_anisotropy * similarity * similarity);
+    float reduced = depth * (1.0 - phase_anisotropy) * inverse;
+    float column = sqrt(clamp(cosine, 0.0, 1.0));
+    float row = medium_table_row(reduced);
+    float slice = sqrt(similarity);
+    vec2 entry = medium_table(vec3(column, row, slice));
+    vec2 infinite = medium_table(vec3(column, 1.0, slice));
+    float hit = interacting(reduced / max(cosine, smallest_cosine));
+    // Deeper than the table, what comes through falls with the depth.
+    float back = 1.0 - max(1.0 - entry.x, 0.0) * min(4096.0 / max(reduced, 1e-6), 1.0);
+    float escaping = hit * single * entry.y;
+    result.opaque = hit * hit * saturated(2.0 * back - 1.0);
+    // An infinitely thick medium reflects its albedo towards every angle, as an opaque one does.
+    float toward_albedo = mix(1.0, albedo / max(single * infinite.y, 1e-30), result.opaque);
+    result.reflected = min(escaping * back * (similarity > 0.0 ? toward_albedo : 1.0), 1.0);
+    // Of the light that the isotropic medium lets through straight, this one scatters some forward; a backward phase function
+    // takes some of it.
+    float inside = max(cosine, smallest_cosine);
+    float forward = depth * phase_anisotropy * single * inverse / inside;
+    result.straight = exp(-depth / inside);
+    float through = escaping * (1.0 - back) + (forward > 0.0 ? exp(-reduced / inside) * interacting(forward)
+                                                             : -result.straight * interacting(-forward));
+    result.through = max(through, 0.0);
+    result.straight = max(result.straight + min(through, 0.0), 0.0);
+    return result;
+}
+
+// Share of the light that a medium scatters back which leaves farther from where it entered than half a footprint.
+// Source: Christensen and Burley 2015, "Approximate reflectance profiles for efficient subsurface scattering", diffuse light.
+float subsurface_share(float albedo, float mean_free_path, float footprint) {
+    float scale = 1.9 - albedo + 3.5 * (albedo - 0.8) * (albedo - 0.8);
+    float radius = 0.5 * scale * clamp(footprint, 0.0, longest_length) / clamp(mean_free_path, shortest_length, longest_length);
+    return 0.25 * exp(-radius) + 0.75 * exp(-radius / 3.0);
+}
+
+#endif
