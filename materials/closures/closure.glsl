@@ -105,8 +105,16 @@ SpecularLobe make_specular_lobe(Fresnel fresnel, vec3 view, float roughness, flo
         lobe.passed = fresnel_transmittance(fresnel, view.z);
         return lobe;
     }
-    float alpha = sqrt(0.5 * dot(lobe.alpha, lobe.alpha));
-    GgxAlbedo albedo = ggx_albedo(min(view.z, 1.0), alpha);
+#ifdef NACRE_SLAB_ANISOTROPY
+    GgxAlbedo albedo;
+    if (lobe.alpha.x == lobe.alpha.y) {
+        albedo = ggx_albedo(min(view.z, 1.0), lobe.alpha.x);
+    } else {
+        albedo = stretched_ggx_albedo(view, lobe.alpha);
+    }
+#else
+    GgxAlbedo albedo = ggx_albedo(min(view.z, 1.0), lobe.alpha.x);
+#endif
     vec3 mean = fresnel_mean(fresnel);
     vec3 single = fresnel.normal * (1.0 - albedo.schlick) + fresnel.grazing * albedo.schlick - fresnel.dip * albedo.dip;
     vec3 not_single = (vec3(1.0) - fresnel.normal) * (1.0 - albedo.schlick) +

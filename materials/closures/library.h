@@ -19,6 +19,8 @@ namespace nacre::materials::closures {
 struct Library : Lobes {
     /// materials/tables/interface_table.h between its entries.
     [[nodiscard]] static vec4 interface_table(vec2 at);
+    /// materials/tables/anisotropy_table.h between its entries.
+    [[nodiscard]] static vec2 anisotropy_table(vec4 at);
     /// materials/tables/medium_table.h between its entries.
     [[nodiscard]] static vec2 medium_table(vec3 at);
 

@@ -19,7 +19,7 @@
 
 namespace nacre::materials::closures {
 
-using glm::abs, glm::clamp, glm::cos, glm::cross, glm::dot, glm::exp, glm::exp2, glm::floor, glm::fract;
+using glm::abs, glm::atan, glm::clamp, glm::cos, glm::cross, glm::dot, glm::exp, glm::exp2, glm::floor, glm::fract;
 using glm::inversesqrt, glm::length, glm::log, glm::log2, glm::max, glm::min, glm::mix, glm::normalize, glm::pow;
 using glm::sin, glm::sqrt;
 

@@ -4,6 +4,7 @@
 
 #include <cstring>
 
+#include "materials/tables/anisotropy_table.h"
 #include "materials/tables/interface_table.h"
 #include "materials/tables/medium_table.h"
 #include "rhi/device.h"
@@ -61,6 +62,23 @@ vec2 medium_table(vec3 at) {
     ivec3 entry = min(ivec3(place), ivec3(14, 39, 22));
     vec3 part = place - vec3(entry);
     return mix(medium_slice(entry, part), medium_slice(ivec3(entry.x, entry.y, entry.z + 1), part), part.z);
+}
+
+layout(set = 0, binding = 4) readonly buffer Anisotropy { uint anisotropy_words[]; };
+
+vec2 anisotropy_table(vec4 at) {
+    vec4 place = clamp(at, vec4(0.0), vec4(1.0)) * vec4(11.0, 9.0, 11.0, 10.0);
+    ivec4 entry = min(ivec4(place), ivec4(10, 8, 10, 9));
+    vec4 part = place - vec4(entry);
+    vec2 sum = vec2(0.0);
+    for (int corner = 0; corner < 16; ++corner) {
+        ivec4 offset = ivec4(corner & 1, corner >> 1 & 1, corner >> 2 & 1, corner >> 3);
+        vec4 weight = mix(vec4(1.0) - part, part, vec4(offset));
+        ivec4 index = entry + offset;
+        int word = ((index.w * 12 + index.z) * 10 + index.y) * 12 + index.x;
+        sum += weight.x * weight.y * weight.z * weight.w * unpackUnorm2x16(anisotropy_words[word]);
+    }
+    return sum;
 }
 
 #include "materials/closures/closure.glsl"
@@ -164,11 +182,15 @@ TEST_P(ClosureOnDevice, AgreesWithDoublePrecision) {
     ASSERT_TRUE((*device)->write_buffer(table_buffer, table));
     const auto medium_buffer = made((*device)->create_buffer({.size = medium_table().size_bytes(), .usage = BufferUsage::storage}));
     ASSERT_TRUE((*device)->write_buffer(medium_buffer, medium_table()));
+    const auto anisotropy_buffer =
+        made((*device)->create_buffer({.size = anisotropy_table().size_bytes(), .usage = BufferUsage::storage}));
+    ASSERT_TRUE((*device)->write_buffer(anisotropy_buffer, anisotropy_table()));
     const auto group = made((*device)->create_bind_group({.layout = made((*device)->bind_group_layout(pipeline, 0)),
                                                           .entries = {{.binding = 0, .buffer = point_buffer},
                                                                       {.binding = 1, .buffer = result_buffer},
                                                                       {.binding = 2, .buffer = table_buffer},
-                                                                      {.binding = 3, .buffer = medium_buffer}},
+                                                                      {.binding = 3, .buffer = medium_buffer},
+                                                                      {.binding = 4, .buffer = anisotropy_buffer}},
                                                           .name = "closures"}));
     CommandList list = (*device)->create_command_list("closures");
     list.set_pipeline(pipeline);

@@ -2,6 +2,7 @@
 // The tables hold what their generators compute, and are right between their entries too.
 #include <gtest/gtest.h>
 
+#include "materials/tables/anisotropy_table_generator.h"
 #include "materials/tables/interface_table.h"
 #include "materials/tables/interface_table_generator.h"
 #include "materials/tables/medium_table_generator.h"
@@ -47,6 +48,13 @@ TEST(InterfaceTable, BetweenEntriesTheErrorIsBelowOneIn1000) {
     EXPECT_LT(dip, 6e-5);
     EXPECT_LT(chan, 1e-3);
     std::printf("largest errors: total %.1e, schlick %.1e, dip %.1e, diffuse %.1e\n", total, schlick, dip, chan);
+}
+
+TEST(AnisotropyTable, EntriesAreThoseOfTheGenerator) {
+    for (std::uint32_t i = 0; i < 12 * 10 * 12 * 11; i += 199) {
+        const auto entry = anisotropy_table_entry({i % 12, i / 12 % 10, i / 120 % 12, i / 1440}, 96);
+        for (int word = 0; word < 2; ++word) EXPECT_NEAR(anisotropy_table()[2 * i + word] / 65535.0, entry[word], 1e-5) << i;
+    }
 }
 
 TEST(MediumTable, EntriesAreThoseOfTheGenerator) {
