@@ -70,7 +70,7 @@ TEST(MediumTable, EntriesAreThoseOfTheGenerator) {
 /// Reflection of an infinitely thick medium by Chandrasekhar's H function, 1 - sqrt(1 - albedo) H(cosine), which is found as the
 /// fixed point of 1 / H = sqrt(1 - albedo) + albedo / 2 integral of m H(m) / (cosine + m).
 double chandrasekhar(double albedo, double cosine) {
-    constexpr int count = 2000;
+    constexpr int count = 800;
     const auto node = [](int i) { return (i + 0.5) / count; };
     std::vector<double> h(count, 1.0);
     const double root = std::sqrt(1.0 - albedo);
