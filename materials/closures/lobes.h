@@ -37,6 +37,7 @@ struct Lobes {
 #include "materials/closures/ggx.glsl"
 #include "materials/closures/diffuse.glsl"
 #include "materials/closures/fuzz.glsl"
+#include "materials/closures/haze.glsl"
 #include "materials/closures/thin_film.glsl"
 #undef const
 #undef float

@@ -181,6 +181,26 @@ TEST(Lobes, AFilmFadesInAndItsCurvePassesThroughItsReflectance) {
     }
 }
 
+TEST(Lobes, HazeLeavesThePeakOfTheCoreWhereItIs) {
+    Library library;
+    for (const double f0 : {0.0, 0.02, 0.2, 0.9, 1.0}) {
+        for (const double roughness : {0.1, 0.5, 0.9}) {
+            for (const double extent : {0.0, 0.5, 4.0, 100.0}) {
+                for (const double haziness : {0.0, 0.3, 1.0}) {
+                    const auto haze = library.make_haze(f0, roughness, haziness, extent);
+                    EXPECT_LE(haze.f0, 1.0);
+                    EXPECT_GE(haze.f0, f0 - 1e-12);
+                    EXPECT_TRUE(haze.second_weight >= 0.0 && haze.second_weight <= 1.0);
+                    const auto peak = [&](double r) { return library.ggx_distribution({0.0, 0.0, 1.0}, glm::dvec2(r * r)); };
+                    const double whole = haze.f0 * ((1.0 - haze.second_weight) * peak(roughness) +
+                                                    haze.second_weight * peak(haze.second_roughness));
+                    EXPECT_NEAR(whole, f0 * peak(roughness), 1e-9 * peak(roughness));
+                }
+            }
+        }
+    }
+}
+
 TEST(Lobes, IndexAndReflectanceAreInverse) {
     Library library;
     for (const double ior : {1.0, 1.01, 1.33, 1.5, 2.4, 10.0})
