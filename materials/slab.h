@@ -54,7 +54,8 @@ struct Slab {
 
     /// slab_second_lobe. Perceptual roughness of a second GGX lobe with the same reflectance, [0, 1].
     float second_roughness = 0.7f;
-    /// slab_second_lobe. Its share, [0, 1]; the first lobe has the rest. `haze()` gives both from a perceptual haze.
+    /// slab_second_lobe. Its share, [0, 1]; the first lobe has the rest. materials/closures/haze.glsl gives both from a
+    /// perceptual haze.
     float second_weight = 0.0f;
 
     /// slab_fuzz. Coverage of the fibers that stand on the interface, [0, 1].

@@ -12,6 +12,9 @@
 #ifdef NACRE_SLAB_MEDIUM
 #include "materials/closures/medium.glsl"
 #endif
+#ifdef NACRE_SLAB_THIN_FILM
+#include "materials/closures/thin_film.glsl"
+#endif
 // A slab seen from one direction: everything that depends on slab and view is computed once, lights follow.
 //
 // All vectors are unit and in the local frame: z is the normal, x the tangent, y the bitangent; they point away from the
@@ -30,7 +33,10 @@
 //     vec3 internal_reflectance(Slab slab)                            of diffuse light that hits the interface from below
 //     vec3 bounce_factor(vec3 internal, vec3 base_albedo)             (1 - K) / (1 - E_b K)
 //
-// What is not reciprocal: compensation, fuzz and what the interface leaves to the medium are computed towards the view only.
+// Who includes this provides the tables (materials/closures/tables.glsl, medium.glsl) and, where a slab may have
+// slab_specular_lut, vec3 specular_lut(uint index, vec2 at): the tint by the cosines of view and light to the normal.
+//
+// What is not reciprocal: compensation, fuzz, thin film and what the interface leaves to the medium are computed towards the view only.
 // Energy is kept exactly that way (up to the error of the tables), and nothing but the lobes is computed for each light.
 
 struct ClosureValue {
@@ -86,6 +92,9 @@ struct Closure {
     float reflectance;  // of the interface at normal incidence, mean of the channels: tells how directions refract
     float transmission_probability;
 #endif
+#ifdef NACRE_SLAB_SPECULAR_LUT
+    uint specular_lut;
+#endif
     float gloss;
     vec3 diffuse;         // albedo of what leaves where it entered
     float diffuse_scale;  // one over the albedo of the diffuse lobe as it is
@@ -105,8 +114,16 @@ SpecularLobe make_specular_lobe(Fresnel fresnel, vec3 view, float roughness, flo
         lobe.passed = fresnel_transmittance(fresnel, view.z);
         return lobe;
     }
-    float alpha = sqrt(0.5 * dot(lobe.alpha, lobe.alpha));
-    GgxAlbedo albedo = ggx_albedo(min(view.z, 1.0), alpha);
+#ifdef NACRE_SLAB_ANISOTROPY
+    GgxAlbedo albedo;
+    if (lobe.alpha.x == lobe.alpha.y) {
+        albedo = ggx_albedo(min(view.z, 1.0), lobe.alpha.x);
+    } else {
+        albedo = stretched_ggx_albedo(view, lobe.alpha);
+    }
+#else
+    GgxAlbedo albedo = ggx_albedo(min(view.z, 1.0), lobe.alpha.x);
+#endif
     vec3 mean = fresnel_mean(fresnel);
     vec3 single = fresnel.normal * (1.0 - albedo.schlick) + fresnel.grazing * albedo.schlick - fresnel.dip * albedo.dip;
     vec3 not_single = (vec3(1.0) - fresnel.normal) * (1.0 - albedo.schlick) +
@@ -117,6 +134,14 @@ SpecularLobe make_specular_lobe(Fresnel fresnel, vec3 view, float roughness, flo
     return lobe;
 }
 
+#ifdef NACRE_SLAB_SPECULAR_LUT
+// A tint never adds light; what it takes is absorbed, the medium gets no more for it.
+vec3 specular_tint(uint index, float view_cosine, float light_cosine) {
+    return clamp(specular_lut(index, vec2(saturated(view_cosine), saturated(light_cosine))), vec3(0.0), vec3(1.0));
+}
+#endif
+
+// Of the interface without a film.
 Fresnel slab_fresnel(Slab slab) {
     vec3 f90 = vec3(1.0);
     vec3 f82 = vec3(1.0);
@@ -138,6 +163,12 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
     if ((slab.features & slab_anisotropy) != 0u) anisotropy = slab.anisotropy;
 #endif
     closure.fresnel = slab_fresnel(slab);
+#ifdef NACRE_SLAB_THIN_FILM
+    if ((slab.features & slab_thin_film) != 0u) {
+        float typical = ggx_typical_cosine(min(closure.view.z, 1.0), slab.roughness * slab.roughness);
+        closure.fresnel = make_film_fresnel(closure.fresnel, slab.film_thickness, slab.film_ior, typical);
+    }
+#endif
     closure.specular = make_specular_lobe(closure.fresnel, closure.view, slab.roughness, anisotropy);
     vec3 passed = closure.specular.passed;
 #ifdef NACRE_SLAB_SECOND_LOBE
@@ -174,6 +205,18 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
     vec3 entering = passed * uncovered;
     closure.diffuse = slab.albedo * entering;
     closure.diffuse_scale = 1.0 / chan_albedo_by_table(min(closure.view.z, 1.0), closure.gloss);
+#ifdef NACRE_SLAB_SPECULAR_LUT
+    closure.specular_lut = slab.specular_lut;
+    if ((slab.features & slab_specular_lut) != 0u) {
+        // Most of the light of a lobe comes from about the mirrored view.
+        vec3 tint = specular_tint(slab.specular_lut, closure.view.z, closure.view.z);
+        closure.specular.albedo *= tint;
+#ifdef NACRE_SLAB_SECOND_LOBE
+        if ((slab.features & slab_second_lobe) != 0u) closure.second.albedo *= tint;
+        closure.second_probability *= largest(tint);
+#endif
+    }
+#endif
     closure.specular_probability = largest(closure.specular.albedo);
     vec3 diffuse = closure.diffuse;
 #ifdef NACRE_SLAB_MEDIUM
@@ -251,6 +294,10 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
     if ((closure.features & slab_second_lobe) != 0u) lobes += specular_lobe_value(closure.second, closure.view, light, h);
 #endif
     value.specular = lobes * fresnel_reflectance(closure.fresnel, half_vector_cosine(closure.view, light));
+#ifdef NACRE_SLAB_SPECULAR_LUT
+    if ((closure.features & slab_specular_lut) != 0u)
+        value.specular *= specular_tint(closure.specular_lut, closure.view.z, light.z);
+#endif
 #ifdef NACRE_SLAB_FUZZ
     if ((closure.features & slab_fuzz) != 0u) value.specular += closure.fuzz * sheen_density(closure.fuzz_map, light);
 #endif

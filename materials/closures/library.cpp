@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "materials/tables/anisotropy_table.h"
 #include "materials/tables/interface_table.h"
 #include "materials/tables/medium_table.h"
 
@@ -19,6 +20,33 @@ Lobes::vec4 Library::interface_table(vec2 at) {
     const int column = std::min(static_cast<int>(x), columns - 2), row = std::min(static_cast<int>(y), rows - 2);
     return glm::mix(glm::mix(entry(column, row), entry(column + 1, row), x - column),
                     glm::mix(entry(column, row + 1), entry(column + 1, row + 1), x - column), y - row);
+}
+
+Lobes::vec2 Library::anisotropy_table(vec4 at) {
+    const auto words = materials::anisotropy_table();
+    std::size_t lowest = 0, stride = 1;
+    std::size_t strides[4];
+    double part[4];
+    for (int axis = 0; axis < 4; ++axis) {
+        const double place = std::clamp(at[axis], 0.0, 1.0) * (anisotropy_table_size[axis] - 1);
+        const int entry = std::min(static_cast<int>(place), static_cast<int>(anisotropy_table_size[axis]) - 2);
+        part[axis] = place - entry;
+        lowest += stride * static_cast<std::size_t>(entry);
+        strides[axis] = stride;
+        stride *= anisotropy_table_size[axis];
+    }
+    vec2 sum(0.0);
+    for (int corner = 0; corner < 16; ++corner) {
+        double weight = 1.0;
+        std::size_t entry = lowest;
+        for (int axis = 0; axis < 4; ++axis) {
+            const bool is_upper = (corner >> axis & 1) != 0;
+            weight *= is_upper ? part[axis] : 1.0 - part[axis];
+            if (is_upper) entry += strides[axis];
+        }
+        sum += weight * vec2(words[2 * entry], words[2 * entry + 1]) / 65535.0;
+    }
+    return sum;
 }
 
 Lobes::vec2 Library::medium_table(vec3 at) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
+
 #include "materials/closures/lobes.h"
 #include "materials/slab.h"  // has the features that the text below asks for
 
@@ -12,13 +14,19 @@
 ///     auto closure = library.prepare_closure(closures::Library::slab_of(gold), view, 1e-3);
 ///     glm::dvec3 value = library.evaluate_closure(closure, light).specular;
 ///
-/// An object has no state but what it points at; different threads may use it at the same time.
+/// An object has no state but its tints; different threads may use it at the same time.
 
 namespace nacre::materials::closures {
 
 struct Library : Lobes {
+    /// What slab_specular_lut looks up: index of the tint, cosines of view and light. Unset: white.
+    std::function<vec3(uint, vec2)> tints;
+    [[nodiscard]] vec3 specular_lut(uint index, vec2 at) const { return tints ? tints(index, at) : vec3(1.0); }
+
     /// materials/tables/interface_table.h between its entries.
     [[nodiscard]] static vec4 interface_table(vec2 at);
+    /// materials/tables/anisotropy_table.h between its entries.
+    [[nodiscard]] static vec2 anisotropy_table(vec4 at);
     /// materials/tables/medium_table.h between its entries.
     [[nodiscard]] static vec2 medium_table(vec3 at);
 

@@ -21,9 +21,9 @@
 
 namespace nacre::materials::closures {
 
-using glm::abs, glm::clamp, glm::cos, glm::cross, glm::dot, glm::exp, glm::exp2, glm::floor, glm::fract;
+using glm::abs, glm::atan, glm::clamp, glm::cos, glm::cross, glm::dot, glm::exp, glm::exp2, glm::floor, glm::fract;
 using glm::inversesqrt, glm::length, glm::log, glm::log2, glm::max, glm::min, glm::mix, glm::normalize, glm::pow;
-using glm::sin, glm::sqrt;
+using glm::sin, glm::smoothstep, glm::sqrt;
 
 struct Lobes {
     using uint = std::uint32_t;
@@ -39,6 +39,8 @@ struct Lobes {
 #include "materials/closures/ggx.glsl"
 #include "materials/closures/diffuse.glsl"
 #include "materials/closures/fuzz.glsl"
+#include "materials/closures/haze.glsl"
+#include "materials/closures/thin_film.glsl"
 #undef const
 #undef float
 };

@@ -7,6 +7,7 @@
 //
 //     vec4 interface_table(vec2 at)     materials/tables/interface_table.h, bilinear, (0, 0) and (1, 1) being the first and the
 //                                       last entry: a texture's coordinate is (at * vec2(63, 95) + 0.5) / vec2(64, 96)
+//     vec2 anisotropy_table(vec4 at)    with slab_anisotropy: materials/tables/anisotropy_table.h, linear in all four
 
 // What a GGX lobe with single scattering reflects towards a direction.
 struct GgxAlbedo {
@@ -27,6 +28,29 @@ GgxAlbedo ggx_albedo(float cos_theta, float alpha) {
 #endif
     return albedo;
 }
+
+#ifdef NACRE_SLAB_ANISOTROPY
+// The same for a stretched lobe.
+GgxAlbedo stretched_ggx_albedo(vec3 view, vec2 alpha) {
+    float larger = max(alpha.x, alpha.y);
+    float smaller = min(alpha.x, alpha.y);
+    float along = alpha.x >= alpha.y ? abs(view.x) : abs(view.y);
+    float across = alpha.x >= alpha.y ? abs(view.y) : abs(view.x);
+    float tangent_length = max(sqrt(along * along + across * across), 1e-20);
+    along /= tangent_length;
+    across /= tangent_length;
+    float seen = sqrt(square(larger * along) + square(smaller * across));
+    float cosine = min(view.z, 1.0);
+    float ratio = smaller / larger;
+    // Straight down every azimuth is the same.
+    vec2 entry = anisotropy_table(vec4(ggx_table_coordinate(cosine, seen),
+                                       atan(sqrt(sqrt(ratio)) * across, along) * (2.0 / pi), pow(ratio, 1.0 / 3.0), sqrt(larger)));
+    GgxAlbedo albedo = ggx_albedo(cosine, seen);
+    albedo.missing = entry.x;
+    albedo.schlick = clamp(albedo.schlick + (entry.y - 0.25) * 0.5, 0.0, 1.0);
+    return albedo;
+}
+#endif
 
 // Of Chan's diffuse model; never 0.
 float chan_albedo_by_table(float cos_theta, float gloss) {

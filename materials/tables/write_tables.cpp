@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <string_view>
 
+#include "materials/tables/anisotropy_table_generator.h"
 #include "materials/tables/interface_table_generator.h"
 #include "materials/tables/medium_table_generator.h"
 
@@ -43,6 +44,18 @@ void write_medium_table() {
     std::puts("");
 }
 
+void write_anisotropy_table() {
+    using namespace nacre::materials;
+    WordWriter words;
+    const auto& size = anisotropy_table_size;
+    for (std::uint32_t i = 0; i < size[0] * size[1] * size[2] * size[3]; ++i) {
+        const std::uint32_t above = i / size[0], higher = above / size[1];
+        for (const double value : anisotropy_table_entry({i % size[0], above % size[1], higher % size[2], higher / size[2]}, 96))
+            words.write(value);
+    }
+    std::puts("");
+}
+
 }  // namespace
 
 int main(int count, char** arguments) {
@@ -52,8 +65,10 @@ int main(int count, char** arguments) {
         write_interface_table();
     } else if (name == "medium") {
         write_medium_table();
+    } else if (name == "anisotropy") {
+        write_anisotropy_table();
     } else {
-        std::fputs("write_tables: name one table: interface, medium\n", stderr);
+        std::fputs("write_tables: name one table: interface, medium, anisotropy (which reads the first)\n", stderr);
         return 2;
     }
 }

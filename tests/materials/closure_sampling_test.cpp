@@ -147,15 +147,15 @@ struct Case {
 
 std::vector<Case> cases() {
     std::vector<Case> result;
-    for (const float roughness : {0.02f, 0.1f, 0.4f, 1.0f})
+    for (const float roughness : {0.02f, 0.3f, 1.0f})
         result.push_back({"metal " + std::to_string(roughness), {.f0 = glm::vec3(0.8f), .roughness = roughness, .albedo = glm::vec3(0.0f)}});
-    for (const float anisotropy : {-0.6f, 0.3f, 0.9f})
+    for (const float anisotropy : {-0.6f, 0.9f})
         result.push_back({"stretched " + std::to_string(anisotropy),
                           {.features = slab_anisotropy, .f0 = glm::vec3(0.8f), .roughness = 0.5f, .albedo = glm::vec3(0.0f), .anisotropy = anisotropy}});
     result.push_back({"diffuse", {.f0 = glm::vec3(0.0f), .roughness = 0.7f}});
     result.push_back({"plastic", {.f0 = glm::vec3(0.04f), .roughness = 0.3f, .albedo = glm::vec3(0.5f)}});
     result.push_back({"mirror over diffuse", {.f0 = glm::vec3(0.3f), .roughness = 0.0f, .albedo = glm::vec3(0.5f)}});
-    for (const float roughness : {0.1f, 0.4f, 1.0f})
+    for (const float roughness : {0.1f, 0.7f})
         result.push_back({"fuzz " + std::to_string(roughness),
                           {.features = slab_fuzz, .f0 = glm::vec3(0.0f), .albedo = glm::vec3(0.0f), .fuzz_amount = 1.0f, .fuzz_roughness = roughness}});
     result.push_back({"thin",
@@ -173,7 +173,7 @@ double narrowest_angle(const Slab& slab, double cosine) {
     return std::max(slab.roughness * slab.roughness * std::max(cosine, 0.02), 1e-5);
 }
 
-constexpr double view_angles[] = {1.0, 0.25, 0.01};
+constexpr double view_angles[] = {0.6, 0.01};
 
 TEST(ClosureSampling, SamplesFollowTheDensity) {
     Library library;
@@ -194,7 +194,7 @@ TEST(ClosureSampling, SamplesFollowTheDensity) {
 TEST(ClosureSampling, ADensityThatIsWrongByOnePercentIsFound) {
     Library library;
     for (const Case& test : cases()) {
-        if (test.name == "mirror over diffuse") continue;
+        if (test.name != "stretched 0.900000" && test.name != "diffuse" && test.name != "everything") continue;
         const auto closure = library.prepare_closure(Library::slab_of(test.slab), direction(0.25, 0.4), 1e-3);
         EXPECT_LT(smallest_probability(library, closure, narrowest_angle(test.slab, 0.25), sample_count(500000), 7, 1.01), 1e-5) << test.name;
     }

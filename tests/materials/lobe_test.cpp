@@ -120,6 +120,87 @@ TEST(Lobes, FresnelKeepsItsThreeColorsAndFadesWhereNoMatterReflectsSoLittle) {
     EXPECT_NEAR(glm::distance(sum, library.fresnel_mean(fresnel)), 0.0, 1e-6);
 }
 
+/// Linear sRGB of a film on a dielectric by the whole Airy series, integrated over frequencies with the color matching functions
+/// as Gaussians; Schlick's formula at both sides, as the lobe has it.
+glm::dvec3 spectral_film(Library& library, double f0, double thickness, double ior, double cosine) {
+    const double outer_f0 = library.ior_to_reflectance(ior);
+    const double inside = std::sqrt(1.0 - (1.0 - cosine * cosine) / (ior * ior));
+    const double r12 = std::sqrt(outer_f0 + (1.0 - outer_f0) * std::pow(1.0 - cosine, 5.0));
+    const double below = library.reflectance_under(f0, ior);
+    double r23 = std::sqrt(below + (1.0 - below) * std::pow(1.0 - inside, 5.0));
+    if (f0 < outer_f0) r23 = -r23;
+    const auto reflectance = [&](double frequency) {
+        const double phase = 2.0 * std::numbers::pi * frequency * 2.0 * ior * thickness * inside;
+        // |(r12 + r23 e^(i phase)) / (1 + r12 r23 e^(i phase))|^2
+        const double c = std::cos(phase);
+        return (r12 * r12 + r23 * r23 + 2.0 * r12 * r23 * c) / (1.0 + r12 * r12 * r23 * r23 + 2.0 * r12 * r23 * c);
+    };
+    const auto band = [&](double position, double variance) {
+        const double sigma = std::sqrt(2.0 * variance);
+        double sum = 0.0, weights = 0.0;
+        for (int i = -400; i <= 400; ++i) {
+            const double weight = std::exp(-0.5 * std::pow(i / 80.0, 2.0));
+            sum += weight * reflectance(position + sigma * i / 80.0);
+            weights += weight;
+        }
+        return sum / weights;
+    };
+    const double x = 0.846202 * band(1.6810e6, 4.3278e9) + 0.153798 * band(2.2399e6, 4.5282e9);
+    const double y = band(1.7953e6, 9.3046e9), z = band(2.2084e6, 6.6121e9);
+    return {2.6897 * x - 1.2759 * y - 0.4138 * z, -1.0221 * x + 1.9783 * y + 0.0438 * z, 0.0612 * x - 0.2245 * y + 1.1633 * z};
+}
+
+TEST(Lobes, ThinFilmIsTheSpectrumOfAirysSeries) {
+    Library library;
+    double largest = 0.0;
+    for (const double f0 : {0.02, 0.04, 0.2}) {
+        for (const double ior : {1.3, 1.8}) {
+            for (const double thickness : {1e-7, 3e-7, 6e-7, 1e-6}) {
+                for (const double cosine : {1.0, 0.7, 0.3}) {
+                    const glm::dvec3 film = library.film_reflectance(glm::dvec3(f0), thickness, ior, cosine);
+                    const glm::dvec3 exact = glm::clamp(spectral_film(library, f0, thickness, ior, cosine), 0.0, 1.0);
+                    for (int channel = 0; channel < 3; ++channel)
+                        largest = std::max(largest, std::abs(film[channel] - exact[channel]));
+                }
+            }
+        }
+    }
+    // Two orders of a series whose ratio is at most 0.3 here: what is left out is below 0.01.
+    EXPECT_LT(largest, 0.01);
+    std::printf("largest error of two orders: %.1e\n", largest);
+}
+
+TEST(Lobes, AFilmFadesInAndItsCurvePassesThroughItsReflectance) {
+    Library library;
+    const auto bare = library.make_fresnel({0.04, 0.3, 0.9}, glm::dvec3(1.0), glm::dvec3(1.0));
+    EXPECT_NEAR(glm::distance(library.make_film_fresnel(bare, 0.0, 1.5, 0.6).normal, bare.normal), 0.0, 1e-12);
+    for (const double cosine : {1.0, 0.8, 0.5}) {
+        const auto fresnel = library.make_film_fresnel(bare, 4e-7, 1.5, cosine);
+        const glm::dvec3 film = library.film_reflectance(bare.normal, 4e-7, 1.5, cosine);
+        EXPECT_NEAR(glm::distance(library.fresnel_reflectance(fresnel, cosine), film), 0.0, 1e-9);
+    }
+}
+
+TEST(Lobes, HazeLeavesThePeakOfTheCoreWhereItIs) {
+    Library library;
+    for (const double f0 : {0.0, 0.02, 0.2, 0.9, 1.0}) {
+        for (const double roughness : {0.1, 0.5, 0.9}) {
+            for (const double extent : {0.0, 0.5, 4.0, 100.0}) {
+                for (const double haziness : {0.0, 0.3, 1.0}) {
+                    const auto haze = library.make_haze(f0, roughness, haziness, extent);
+                    EXPECT_LE(haze.f0, 1.0);
+                    EXPECT_GE(haze.f0, f0 - 1e-12);
+                    EXPECT_TRUE(haze.second_weight >= 0.0 && haze.second_weight <= 1.0);
+                    const auto peak = [&](double r) { return library.ggx_distribution({0.0, 0.0, 1.0}, glm::dvec2(r * r)); };
+                    const double whole = haze.f0 * ((1.0 - haze.second_weight) * peak(roughness) +
+                                                    haze.second_weight * peak(haze.second_roughness));
+                    EXPECT_NEAR(whole, f0 * peak(roughness), 1e-9 * peak(roughness));
+                }
+            }
+        }
+    }
+}
+
 TEST(Lobes, IndexAndReflectanceAreInverse) {
     Library library;
     for (const double ior : {1.0, 1.01, 1.33, 1.5, 2.4, 10.0})

@@ -9,7 +9,9 @@
 #include <random>
 
 #include "materials/evaluation.h"
+#include "materials/tables/anisotropy_table.h"
 #include "materials/tables/interface_table.h"
+#include "materials/tables/medium_table.h"
 #include "rhi/device.h"
 #include "rhi/shader_compiler.h"
 #include "samples/backends.h"
@@ -36,22 +38,13 @@ constexpr const char* shader_text = R"(
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, std430) readonly buffer Directions { vec4 directions[]; };
 layout(set = 0, binding = 1, std430) readonly buffer Parameters { float parameters[]; };
-layout(set = 0, binding = 2, std430) readonly buffer Table { uint table[]; };
-layout(set = 0, binding = 3, std430) writeonly buffer Results { vec4 results[]; };
+layout(set = 0, binding = 2, std430) writeonly buffer Results { vec4 results[]; };
+#define NACRE_TABLE_SET 0
+#define NACRE_TABLE_BINDING 3
+#include "materials/closures/table_buffers.glsl"
 float tree_parameter(uint index) { return parameters[index]; }
 // Textures of the test: four different values.
 vec4 tree_texture(uint index) { return vec4(0.25, 0.5, 0.75, 1.0); }
-vec4 table_entry(uint column, uint row) {
-    uint word = 2u * (row * table_columns + column);
-    return vec4(unpackUnorm2x16(table[word]), unpackUnorm2x16(table[word + 1u]));
-}
-vec4 interface_table(vec2 at) {
-    vec2 place = clamp(at, vec2(0.0), vec2(1.0)) * vec2(table_columns - 1u, table_rows - 1u);
-    uvec2 low = min(uvec2(place), uvec2(table_columns, table_rows) - 2u);
-    vec2 fraction = place - vec2(low);
-    return mix(mix(table_entry(low.x, low.y), table_entry(low.x + 1u, low.y), fraction.x),
-               mix(table_entry(low.x, low.y + 1u), table_entry(low.x + 1u, low.y + 1u), fraction.x), fraction.y);
-}
 )";
 
 constexpr const char* main_text = R"(
@@ -79,13 +72,10 @@ class TreeShaderTest : public testing::TestWithParam<const char*> {
     }
 
     Expected<std::vector<glm::vec4>> run(const TreeShader& tree, const std::vector<glm::vec4>& inputs) {
-        const std::string table_size = fmt::format("const uint table_columns = {}u, table_rows = {}u;\n", interface_table_columns,
-                                                   interface_table_rows);
         rhi::ShaderCompiler compiler({.embedded = {embedded_files()}});
-        NACRE_TRY(const rhi::ShaderDesc text, compiler.compile({.path = "tree.comp", .text = table_size + shader_text + tree.glsl + main_text}));
+        NACRE_TRY(const rhi::ShaderDesc text, compiler.compile({.path = "tree.comp", .text = shader_text + tree.glsl + main_text}));
         NACRE_TRY(const rhi::Shader shader, device_->create_shader(text));
         NACRE_TRY(const rhi::ComputePipeline pipeline, device_->create_compute_pipeline({.shader = shader, .name = "tree"}));
-        const auto words = interface_table();
         const auto make = [&](std::size_t size, const void* data, const char* name) -> Expected<rhi::Buffer> {
             NACRE_TRY(rhi::Buffer buffer, device_->create_buffer({.size = size, .usage = rhi::BufferUsage::storage, .name = name}));
             if (data != nullptr)
@@ -94,15 +84,19 @@ class TreeShaderTest : public testing::TestWithParam<const char*> {
         };
         NACRE_TRY(const rhi::Buffer directions, make(inputs.size() * sizeof(glm::vec4), inputs.data(), "directions"));
         NACRE_TRY(const rhi::Buffer parameters, make(tree.parameters.size() * 4, tree.parameters.data(), "parameters"));
-        NACRE_TRY(const rhi::Buffer table, make(words.size_bytes(), words.data(), "table"));
+        NACRE_TRY(const rhi::Buffer table_0, make(interface_table().size_bytes(), interface_table().data(), "interface"));
+        NACRE_TRY(const rhi::Buffer table_1, make(medium_table().size_bytes(), medium_table().data(), "medium"));
+        NACRE_TRY(const rhi::Buffer table_2, make(anisotropy_table().size_bytes(), anisotropy_table().data(), "anisotropy"));
         NACRE_TRY(const rhi::Buffer results, make(inputs.size() * sizeof(glm::vec4), nullptr, "results"));
         NACRE_TRY(const rhi::BindGroupLayout layout, device_->bind_group_layout(pipeline, 0));
         NACRE_TRY(const rhi::BindGroup group,
                   device_->create_bind_group({.layout = layout,
                                               .entries = {{.binding = 0, .buffer = directions},
                                                           {.binding = 1, .buffer = parameters},
-                                                          {.binding = 2, .buffer = table},
-                                                          {.binding = 3, .buffer = results}},
+                                                          {.binding = 2, .buffer = results},
+                                                          {.binding = 3, .buffer = table_0},
+                                                          {.binding = 4, .buffer = table_1},
+                                                          {.binding = 5, .buffer = table_2}},
                                               .name = "tree"}));
         rhi::CommandList list = device_->create_command_list("tree");
         list.set_pipeline(pipeline);

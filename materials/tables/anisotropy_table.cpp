@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "materials/tables/anisotropy_table.h"
+
+namespace nacre::materials {
+namespace {
+
+constexpr std::uint16_t table[] = {
+#include "materials/tables/anisotropy_table_data.inc"
+};
+static_assert(sizeof(table) == 2 * 2 * 12 * 10 * 12 * 11);
+
+}  // namespace
+
+std::span<const std::uint16_t> anisotropy_table() { return table; }
+
+}  // namespace nacre::materials
