@@ -13,7 +13,8 @@ namespace {
 
 using closures::Library;
 
-constexpr int strata = 6;  // squared: samples of each closure and pixel
+constexpr int strata = 6;      // squared: samples of each closure and pixel
+constexpr int box_strata = 5;  // squared: samples of the soft box
 constexpr double ball_diameter = 0.1;
 
 double smooth(double edge, double width, double x) {
@@ -40,47 +41,92 @@ glm::dvec3 turned(const glm::dvec3& v, double angle) {
     return {c * v.x - s * v.y, s * v.x + c * v.y, v.z};
 }
 
-// A low-discrepancy number for each pixel, so that neighbors err differently.
-double shift_of(std::uint32_t x, std::uint32_t y) { return std::fmod(x * 0.7548776662466927 + y * 0.5698402909980532, 1.0); }
+// A number in [0, 1) for each pixel and dimension.
+double number_of(std::uint32_t x, std::uint32_t y, std::uint32_t dimension) {
+    std::uint32_t h = x * 0x9e3779b1u ^ y * 0x85ebca77u ^ dimension * 0xc2b2ae3du;
+    h = (h ^ h >> 15) * 0x2c1b3c6du;
+    h = (h ^ h >> 12) * 0x297a2d39u;
+    return (h ^ h >> 15) * 0x1p-32;
+}
 
-glm::dvec3 radiance(const FlattenedTree& tree, const glm::dvec3& normal, double footprint, double shift) {
+// The soft box: a rectangle on the plane one unit away, from the upper left.
+struct SoftBox {
+    glm::dvec3 center = glm::normalize(glm::dvec3(-0.55, 0.65, 0.6));
+    glm::dvec3 right = glm::normalize(glm::cross(glm::dvec3(0, 1, 0), center)), top = glm::cross(center, right);
+    static constexpr double half_width = 0.24, half_height = 0.32, edge = 0.04;
+
+    double radiance(const glm::dvec3& direction) const {
+        const double z = glm::dot(direction, center);
+        if (z <= 0.0) return 0.0;
+        const double x = std::abs(glm::dot(direction, right) / z), y = std::abs(glm::dot(direction, top) / z);
+        return 12.0 * (1.0 - smooth(half_width - edge / 2, edge, x)) * (1.0 - smooth(half_height - edge / 2, edge, y));
+    }
+    glm::dvec3 direction(double u, double v) const {
+        return glm::normalize(center + (2.0 * u - 1.0) * half_width * right + (2.0 * v - 1.0) * half_height * top);
+    }
+    // Per solid angle, of directions made of even u and v.
+    double density(const glm::dvec3& direction) const {
+        const double z = glm::dot(direction, center);
+        if (z <= 0.0) return 0.0;
+        const double x = std::abs(glm::dot(direction, right) / z), y = std::abs(glm::dot(direction, top) / z);
+        return x <= half_width && y <= half_height ? 1.0 / (4.0 * half_width * half_height * z * z * z) : 0.0;
+    }
+};
+
+const SoftBox soft_box;
+
+glm::dvec3 ambient_sky(const glm::dvec3& direction) {
+    const double up = direction.y;
+    return up < 0.0 ? glm::mix(glm::dvec3(0.45, 0.42, 0.40), glm::dvec3(0.10, 0.09, 0.08), smooth(0.1, 0.4, -up))
+                    : glm::mix(glm::dvec3(0.75, 0.78, 0.82), glm::dvec3(0.25, 0.38, 0.65), smooth(0.4, 1.0, up));
+}
+
+// What a closure sends to the view. The sky is sampled by the closure, the soft box by both, weighed by their densities (Veach
+// 1997, the balance heuristic).
+glm::dvec3 radiance_of(const ShadedClosure& c, const Frame& frame, std::uint32_t x, std::uint32_t y) {
+    Library library;
+    constexpr double count = strata * strata, box_count = box_strata * box_strata;
+    glm::dvec3 sum(0.0);
+    for (int i = 0; i < strata * strata; ++i) {
+        const auto stratified = [&](double at, std::uint32_t dimension) { return std::fmod(at + number_of(x, y, dimension), 1.0); };
+        const glm::dvec3 random(stratified((i + 0.5) * 0.6180339887498949, 0), stratified((i % strata + 0.5) / strata, 1),
+                                stratified((i / strata + 0.5) / strata, 2));
+        const Library::ClosureSample sample = library.sample_closure(c.closure, random);
+        if (sample.pdf <= 0.0 || sample.direction.z <= 0.0) continue;
+        const glm::dvec3 direction = frame.to_world(turned(sample.direction, c.rotation));
+        const double own = count * sample.pdf;
+        const double share = sample.is_mirror ? 1.0 : own / (own + box_count * soft_box.density(direction));
+        sum += sample.weight * library.top_transmittance(c.path, sample.direction.z) *
+               (ambient_sky(direction) + share * soft_box.radiance(direction)) / count;
+    }
+    for (int i = 0; i < box_strata * box_strata; ++i) {
+        const glm::dvec3 direction = soft_box.direction((i % box_strata + number_of(x, y, 3 + i)) / box_strata,
+                                                        (i / box_strata + number_of(x, y, 40 + i)) / box_strata);
+        const glm::dvec3 light = turned(frame.to_local(direction), -c.rotation);
+        if (light.z <= 0.0) continue;
+        const Library::ClosureValue value = library.evaluate_closure(c.closure, light);
+        sum += (value.specular + value.diffuse + value.subsurface) * library.top_transmittance(c.path, light.z) *
+               soft_box.radiance(direction) / (box_count * soft_box.density(direction) + count * library.closure_pdf(c.closure, light));
+    }
+    return sum;
+}
+
+glm::dvec3 radiance(const FlattenedTree& tree, const glm::dvec3& normal, double footprint, std::uint32_t x, std::uint32_t y) {
     Library library;
     const Frame frame = frame_at(normal);
-    const glm::dvec3 view = frame.to_local({0, 0, 1});
-    const ShadedTree shaded = shade(tree, view, footprint);
+    const ShadedTree shaded = shade(tree, frame.to_local({0, 0, 1}), footprint);
     glm::dvec3 sum(0.0);
     for (const ShadedClosure& c : shaded.closures) {
-        glm::dvec3 mean(0.0);
-        for (int i = 0; i < strata * strata; ++i) {
-            const glm::dvec3 random(std::fmod((i + 0.5) * 0.6180339887498949 + shift, 1.0), std::fmod((i % strata + 0.5) / strata + shift, 1.0),
-                                    std::fmod((i / strata + 0.5) / strata + 7.0 * shift, 1.0));
-            const Library::ClosureSample sample = library.sample_closure(c.closure, random);
-            if (sample.pdf <= 0.0 || sample.direction.z <= 0.0) continue;
-            mean += sample.weight * library.top_transmittance(c.path, sample.direction.z) *
-                    preview_sky(frame.to_world(turned(sample.direction, c.rotation)));
-        }
-        sum += c.path.weight * c.coverage * mean / static_cast<double>(strata * strata);
-        if ((c.slab.features & slab_emission) != 0) sum += c.path.weight * c.coverage * c.slab.emission;
+        glm::dvec3 sent = radiance_of(c, frame, x, y);
+        if ((c.slab.features & slab_emission) != 0) sent += c.slab.emission;
+        sum += c.path.weight * c.coverage * sent;
     }
     return sum + library.matter_throughput(shaded.whole) * preview_sky({0, 0, -1});
 }
 
 }  // namespace
 
-glm::dvec3 preview_sky(const glm::dvec3& direction) {
-    const double up = direction.y;
-    glm::dvec3 sky = up < 0.0 ? glm::mix(glm::dvec3(0.45, 0.42, 0.40), glm::dvec3(0.10, 0.09, 0.08), smooth(0.1, 0.4, -up))
-                              : glm::mix(glm::dvec3(0.75, 0.78, 0.82), glm::dvec3(0.25, 0.38, 0.65), smooth(0.4, 1.0, up));
-    // A soft box from the upper left.
-    const glm::dvec3 center = glm::normalize(glm::dvec3(-0.55, 0.65, 0.6));
-    const glm::dvec3 right = glm::normalize(glm::cross(glm::dvec3(0, 1, 0), center)), top = glm::cross(center, right);
-    const double z = glm::dot(direction, center);
-    if (z > 0.0) {
-        const double x = std::abs(glm::dot(direction, right) / z), y = std::abs(glm::dot(direction, top) / z);
-        sky += 12.0 * (1.0 - smooth(0.22, 0.04, x)) * (1.0 - smooth(0.3, 0.04, y));
-    }
-    return sky;
-}
+glm::dvec3 preview_sky(const glm::dvec3& direction) { return ambient_sky(direction) + soft_box.radiance(direction); }
 
 Image preview_ball(const FlattenedTree& tree, std::uint32_t size) {
     Image image{.width = size, .height = size, .channels = 3};
@@ -93,7 +139,7 @@ Image preview_ball(const FlattenedTree& tree, std::uint32_t size) {
             if (squared < 1.0) {
                 const glm::dvec3 normal(u, v, std::sqrt(1.0 - squared));
                 // A pixel covers more of the surface where that turns away.
-                color = radiance(tree, normal, ball_diameter / size / std::max(normal.z, 0.05), shift_of(x, y));
+                color = radiance(tree, normal, ball_diameter / size / std::max(normal.z, 0.05), x, y);
             }
             for (int channel = 0; channel < 3; ++channel)
                 image.texel(x, y)[channel] = static_cast<float>(std::min(color[channel] / (1.0 + color[channel] * 0.25), 1.0));

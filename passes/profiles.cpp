@@ -25,6 +25,8 @@ std::vector<Profile> parse_profiles() {
             profile.color_targets = row.at("color_targets");
             profile.storage_in_fragment = row.at("storage_in_fragment");
             profile.float_color_targets = row.at("float_color_targets");
+            profile.material_bytes = row.at("material_bytes");
+            profile.material_closures = row.at("material_closures");
             profile.gbuffer_bytes_per_pixel = row.at("gbuffer_bytes_per_pixel");
             profile.closures_per_pixel = row.at("closures_per_pixel");
             profile.float32_lit_color = row.at("float32_lit_color");

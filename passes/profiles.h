@@ -24,7 +24,9 @@ struct Profile {
     std::uint32_t color_targets = 3;          ///< Color targets of one render pass.
     bool storage_in_fragment = false;         ///< Storage writes in fragment shaders.
     bool float_color_targets = false;         ///< Blending into float color targets.
-    std::uint32_t gbuffer_bytes_per_pixel = 12;
+    std::uint32_t material_bytes = 12;        ///< Of one material in the G-buffer; beyond that it is simplified.
+    std::uint32_t material_closures = 1;
+    std::uint32_t gbuffer_bytes_per_pixel = 12;  ///< What the renderer's G-buffer holds today.
     std::uint32_t closures_per_pixel = 1;
     bool float32_lit_color = false;           ///< Lit color with 32 instead of 16 bits per channel.
     std::uint32_t lights = 64;                ///< Punctual lights; the weakest beyond are left out, with a warning.

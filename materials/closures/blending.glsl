@@ -112,7 +112,8 @@ Slab mix_slabs(Slab a, Slab b, float amount) {
 
 // A layer; the matters are those of both slabs.
 Slab layer_slabs(Slab top, Slab base, Matter top_matter, Matter base_matter) {
-    vec3 through = top_matter.view_transmittance * bounce_factor(top_matter.internal, base_matter.albedo);
+    // What crosses the top is tinted twice: towards the view, and from the light, which is taken to come along the normal.
+    vec3 through = top_matter.view_transmittance * bounce_factor(top_matter.internal, base_matter.albedo) * top_matter.transmittance;
     BlendShares shares;
     shares.coverage = top.coverage + (1.0 - top.coverage) * base.coverage;
     shares.first = top.coverage;

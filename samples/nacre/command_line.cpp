@@ -9,6 +9,7 @@
 #include <cmath>
 #include <memory>
 
+#include "materials/builtin_materials.h"
 #include "passes/profiles.h"
 #include "rhi/capabilities.h"
 #include "samples/nacre/backends.h"
@@ -86,6 +87,18 @@ constexpr const char* explain_footer = R"(
 Examples:
   nacre explain builtin:spheres --profile mobile
   nacre explain car.gltf --dump-graph graph.svg
+)";
+
+constexpr const char* material_footer = R"(
+A material is a built-in one or a JSON file of docs/materials.md. The report tells what it takes in the G-buffer before and
+after simplification to the budget; the picture shows its tree, a lit ball for each step, and the lobes of its closures.
+
+Examples:
+  nacre material --list
+  nacre material coated-carbon -o coated-carbon.png
+  nacre material my.json --profile mobile
+  nacre material complex-opal --budget 48 --json -
+  nacre material gold --eval 0,0,1,0.6,0,0.8     what one closure after the other reflects: view x,y,z, light x,y,z
 )";
 
 constexpr const char* demo_footer = R"(
@@ -281,6 +294,7 @@ struct Definition {
     CompareArguments compare;
     DiffArguments diff;
     ExplainArguments explain;
+    MaterialArguments material;
     DemoArguments demo;
     CacheArguments cache;
     CompletionArguments completion;
@@ -362,6 +376,24 @@ struct Definition {
         add_dump_graph(*command, explain.scene);
         add_json(*command, explain.scene.json);
 
+        command = app.add_subcommand("material", "Look into a material: closures, bytes, simplification, a picture");
+        command->footer(material_footer);
+        command->add_option("MATERIAL", material.material, "A built-in material or a .json file")->type_name("");
+        command->add_flag("-l,--list", material.list, "List the built-in materials");
+        command->add_flag("--full", material.full, "Simplify to one closure, as rays carry it");
+        command
+            ->add_option("-p,--profile", material.profile,
+                         fmt::format("Budget: {}; default high", join(profile_names())))
+            ->type_name("PROFILE")
+            ->check(one_of(profile_names()));
+        command->add_option("--budget", material.budget, "Bytes for each pixel instead of the profile's")
+            ->type_name("BYTES")
+            ->check(whole_number(4, 1024));
+        command->add_option("--eval", material.evaluate, "Print what each closure reflects: view and light, comma separated")
+            ->type_name("DIRECTIONS");
+        command->add_option("-o,--output", material.output, "Draw it")->type_name("FILE")->check(file_ending({".png"}));
+        add_json(*command, material.json);
+
         command = app.add_subcommand("demo", "Render on all backends that work here and write one page about it");
         command->footer(demo_footer + scene_names());
         demo.scene.scene = "builtin:spheres";
@@ -403,6 +435,7 @@ struct Definition {
         if (name == "compare") return compare;
         if (name == "diff") return diff;
         if (name == "explain") return explain;
+        if (name == "material") return material;
         if (name == "demo") return demo;
         if (name == "cache") return cache;
         return completion;
@@ -431,6 +464,11 @@ std::vector<std::string> value_candidates(const std::string& command, const CLI:
     if (name == "--restrict") return rhi::restriction_names();
     if (name == "--tone-mapping") return {"filmic", "linear"};
     if (name == "--size") return {"1280x720", "1920x1080", "640x360"};
+    if (name == "MATERIAL") {
+        std::vector<std::string> names{"<file>"};
+        for (const materials::BuiltinMaterial& material : materials::builtin_materials()) names.emplace_back(material.name);
+        return names;
+    }
     if (name == "SCENE" || command == "diff") return name == "SCENE" ? scene_candidates() : std::vector<std::string>{"<file>"};
     if (type == "FILE") return {"<file>"};
     if (type == "FOLDER") return {"<folder>"};

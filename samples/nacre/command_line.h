@@ -63,6 +63,17 @@ struct ExplainArguments {
     SceneArguments scene;
 };
 
+struct MaterialArguments {
+    std::string material;             ///< A built-in name or a file; empty with `list`.
+    bool list = false;
+    bool full = false;                ///< Simplify to one closure, whatever the budget.
+    std::string profile = "high";
+    std::optional<std::uint32_t> budget;  ///< Bytes; empty: that of the profile.
+    std::string evaluate;             ///< "VX,VY,VZ,LX,LY,LZ"; empty: no value is asked for.
+    std::string output;               ///< PNG; empty: none.
+    std::string json;
+};
+
 struct DemoArguments {
     SceneArguments scene;
     std::string output = "out/demo";
@@ -79,7 +90,7 @@ struct CompletionArguments {
 };
 
 using Invocation = std::variant<DevicesArguments, RenderArguments, CompareArguments, DiffArguments, ExplainArguments,
-                                DemoArguments, CacheArguments, CompletionArguments>;
+                                MaterialArguments, DemoArguments, CacheArguments, CompletionArguments>;
 
 /// An invocation, or the exit code where everything is said already (help, version, wrong usage).
 std::variant<Invocation, int> parse_command_line(int argc, const char* const* argv);

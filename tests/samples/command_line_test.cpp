@@ -21,7 +21,7 @@ using testing::Not;
 TEST(CommandLineTest, HelpTeaches) {
     const CommandResult help = run_nacre({"--help"});
     EXPECT_EQ(help.exit_code, 0);
-    for (const char* command : {"devices", "render", "compare", "diff", "explain", "demo", "cache", "completion"}) {
+    for (const char* command : {"devices", "render", "compare", "diff", "explain", "material", "demo", "cache", "completion"}) {
         EXPECT_THAT(help.output, HasSubstr(command));
         const CommandResult own = run_nacre({command, "--help"});
         EXPECT_EQ(own.exit_code, 0);
