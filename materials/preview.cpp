@@ -2,9 +2,12 @@
 #include "materials/preview.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <thread>
+#include <vector>
 
 #include "materials/evaluation.h"
 
@@ -131,19 +134,27 @@ glm::dvec3 preview_sky(const glm::dvec3& direction) { return ambient_sky(directi
 Image preview_ball(const FlattenedTree& tree, std::uint32_t size) {
     Image image{.width = size, .height = size, .channels = 3};
     image.pixels.resize(std::size_t{3} * size * size);
-    for (std::uint32_t y = 0; y < size; ++y) {
-        for (std::uint32_t x = 0; x < size; ++x) {
-            const double u = ((x + 0.5) / size * 2.0 - 1.0) * 1.04, v = (1.0 - (y + 0.5) / size * 2.0) * 1.04;
-            const double squared = u * u + v * v;
-            glm::dvec3 color(0.18);
-            if (squared < 1.0) {
-                const glm::dvec3 normal(u, v, std::sqrt(1.0 - squared));
-                // A pixel covers more of the surface where that turns away.
-                color = radiance(tree, normal, ball_diameter / size / std::max(normal.z, 0.05), x, y);
+    std::atomic<std::uint32_t> next{0};
+    const auto work = [&] {
+        for (std::uint32_t y = next++; y < size; y = next++) {
+            for (std::uint32_t x = 0; x < size; ++x) {
+                const double u = ((x + 0.5) / size * 2.0 - 1.0) * 1.04, v = (1.0 - (y + 0.5) / size * 2.0) * 1.04;
+                const double squared = u * u + v * v;
+                glm::dvec3 color(0.18);
+                if (squared < 1.0) {
+                    const glm::dvec3 normal(u, v, std::sqrt(1.0 - squared));
+                    // A pixel covers more of the surface where that turns away.
+                    color = radiance(tree, normal, ball_diameter / size / std::max(normal.z, 0.05), x, y);
+                }
+                for (int channel = 0; channel < 3; ++channel)
+                    image.texel(x, y)[channel] = static_cast<float>(std::min(color[channel] / (1.0 + color[channel] * 0.25), 1.0));
             }
-            for (int channel = 0; channel < 3; ++channel)
-                image.texel(x, y)[channel] = static_cast<float>(std::min(color[channel] / (1.0 + color[channel] * 0.25), 1.0));
         }
+    };
+    {
+        std::vector<std::jthread> threads;
+        for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) threads.emplace_back(work);
+        work();
     }
     return image;
 }

@@ -90,13 +90,14 @@ Examples:
 )";
 
 constexpr const char* material_footer = R"(
-A material is a built-in one or a JSON file of docs/materials.md. The report tells what it takes in the G-buffer before and
+A material is a built-in one, a JSON file of docs/materials.md, or SCENE#NAME for one of a scene. The report tells what it takes in the G-buffer before and
 after simplification to the budget; the picture shows its tree, a lit ball for each step, and the lobes of its closures.
 
 Examples:
   nacre material --list
   nacre material coated-carbon -o coated-carbon.png
   nacre material my.json --profile mobile
+  nacre material car.gltf#paint -o paint.png
   nacre material complex-opal --budget 48 --json -
   nacre material gold --eval 0,0,1,0.6,0,0.8     what one closure after the other reflects: view x,y,z, light x,y,z
 )";
@@ -378,7 +379,7 @@ struct Definition {
 
         command = app.add_subcommand("material", "Look into a material: closures, bytes, simplification, a picture");
         command->footer(material_footer);
-        command->add_option("MATERIAL", material.material, "A built-in material or a .json file")->type_name("");
+        command->add_option("MATERIAL", material.material, "A built-in material, a .json file, or SCENE#NAME")->type_name("");
         command->add_flag("-l,--list", material.list, "List the built-in materials");
         command->add_flag("--full", material.full, "Simplify to one closure, as rays carry it");
         command

@@ -10,6 +10,7 @@
 
 #include "core/image.h"
 #include "materials/builtin_materials.h"
+#include "materials/description_tree.h"
 #include "materials/evaluation.h"
 #include "materials/preview.h"
 #include "materials/simplification.h"
@@ -23,6 +24,7 @@
 #include "samples/nacre/material_sheet.h"
 #include "samples/nacre/output.h"
 #include "samples/nacre/text_table.h"
+#include "scene/load.h"
 
 namespace nacre::command {
 namespace {
@@ -30,12 +32,26 @@ namespace {
 using Json = nlohmann::ordered_json;
 using namespace materials;
 
-constexpr std::uint32_t ball_size = 160;
+constexpr std::uint32_t ball_size = 128;
+
+// "SCENE#NAME": a material of a scene.
+Expected<Tree> material_of_scene(const std::string& scene_name, const std::string& name) {
+    NACRE_TRY(const scene::Scene scene, scene::load_scene(scene_name));
+    std::vector<std::string> names;
+    for (const MaterialDescription& material : scene.materials) {
+        if (material.name == name) return tree_of(material);
+        names.push_back(material.name);
+    }
+    return fail(ErrorCode::not_found, "find material", fmt::format("'{}'", name), fmt::format("scene '{}' has none of this name", scene_name),
+                fmt::format("Use one of: {}.", fmt::join(names, ", ")));
+}
 
 Expected<Tree> find_material(const std::string& name) {
+    if (const std::size_t mark = name.rfind('#'); mark != std::string::npos)
+        return material_of_scene(name.substr(0, mark), name.substr(mark + 1));
     if (!name.ends_with(".json")) {
         auto builtin = make_builtin_material(name);
-        if (!builtin) builtin.error().remedy += " A file's name ends in .json.";
+        if (!builtin) builtin.error().remedy += " A file's name ends in .json; a scene's material is SCENE#NAME.";
         return builtin;
     }
     NACRE_TRY(MaterialFile file, load_material(name));

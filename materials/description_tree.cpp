@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "materials/description_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <limits>
+
+namespace nacre::materials {
+namespace {
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+float unit(float value) { return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : 0.0f; }
+glm::vec3 unit(const glm::vec3& value) { return {unit(value.x), unit(value.y), unit(value.z)}; }
+
+// Distance after which white light has become `color`, as a mean free path: -d / ln(color) (Beer-Lambert).
+glm::vec3 mean_free_path_of(const glm::vec3& color, float distance) {
+    glm::vec3 result;
+    for (int channel = 0; channel < 3; ++channel) {
+        const float c = color[channel];
+        result[channel] = c >= 1.0f || !(distance < infinity) ? infinity : c <= 0.0f ? 0.0f : -distance / std::log(c);
+    }
+    return result;
+}
+
+class Builder {
+  public:
+    explicit Builder(const MaterialDescription& material) : material_(material) {}
+
+    Tree run() {
+        tree_.name = material_.name;
+        if (material_.unlit) return unlit();
+        TangentFrame frame{.normal_texture = material_.normal_texture};
+        if (material_.anisotropy) {
+            frame.rotation = material_.anisotropy->rotation;
+            frame.rotation_texture = material_.anisotropy->texture;
+        }
+        tree_.frames = {frame};
+        NodeIndex root = base();
+        root = with_transmission(root);
+        root = with_coat(root);
+        if (material_.alpha_mode != AlphaMode::opaque) {
+            const auto& texture = alpha_texture();
+            if (alpha() < 1.0f || texture.present()) {
+                root = tree_.coverage(root, alpha());
+                if (texture.present()) texture_on(root, {.field = "amount", .texture = texture, .channel = 3});
+            }
+        }
+        tree_.root = root;
+        for (Node& node : tree_.nodes) node.slab = clamped(node.slab);
+        return std::move(tree_);
+    }
+
+  private:
+    void texture_on(NodeIndex node, TextureInput input) {
+        if (input.texture.present()) tree_.nodes[node].textures.push_back(std::move(input));
+    }
+
+    float alpha() const {
+        return unit(material_.specular_glossiness ? material_.specular_glossiness->diffuse.a : material_.base_color.a);
+    }
+    const TextureReference& alpha_texture() const {
+        return material_.specular_glossiness ? material_.specular_glossiness->diffuse_texture : material_.base_color_texture;
+    }
+    glm::vec3 base_color() const { return unit(glm::vec3(material_.base_color)); }
+
+    Tree unlit() {
+        Slab slab{.f0 = glm::vec3(0.0f), .albedo = glm::vec3(0.0f)};
+        slab.features = slab_emission;
+        slab.emission = base_color();
+        const NodeIndex node = tree_.add(slab, "unlit");
+        texture_on(node, {.field = "emission", .texture = material_.base_color_texture});
+        return std::move(tree_);
+    }
+
+    // What dielectric and metal have in common.
+    Slab common() const {
+        Slab slab;
+        slab.roughness = unit(material_.roughness);
+        if (material_.anisotropy && material_.anisotropy->strength != 0.0f) {
+            const float strength = unit(material_.anisotropy->strength), across = slab.roughness * slab.roughness;
+            const float along = across + (1.0f - across) * strength * strength;
+            slab.features |= slab_anisotropy;
+            slab.roughness = std::sqrt(0.5f * (along + across));
+            slab.anisotropy = along + across > 0.0f ? (along - across) / (along + across) : 0.0f;
+        }
+        if (material_.sheen) {
+            const glm::vec3 color = unit(material_.sheen->color);
+            const float amount = std::max({color.r, color.g, color.b});
+            if (amount > 0.0f) {
+                slab.features |= slab_fuzz;
+                slab.fuzz_amount = amount;
+                slab.fuzz_color = color / amount;
+                slab.fuzz_roughness = unit(material_.sheen->roughness);
+            }
+        }
+        if (material_.iridescence && material_.iridescence->factor > 0.0f) {
+            slab.features |= slab_thin_film;
+            slab.film_thickness = material_.iridescence->thickness_maximum;
+            slab.film_ior = material_.iridescence->ior;
+        }
+        const glm::vec3 emission = material_.emissive * material_.emissive_strength;
+        if (emission != glm::vec3(0.0f)) {
+            slab.features |= slab_emission;
+            slab.emission = emission;
+        }
+        return slab;
+    }
+
+    NodeIndex add(const Slab& slab, const char* name) {
+        const NodeIndex node = tree_.add(slab, name);
+        if (material_.specular_glossiness) {
+            // roughness = 1 - glossiness * texel
+            const float glossiness = unit(material_.specular_glossiness->glossiness);
+            if (material_.specular_glossiness->specular_glossiness_texture.present()) {
+                tree_.nodes[node].slab.roughness = 1.0f;
+                texture_on(node, {.field = "roughness", .texture = material_.specular_glossiness->specular_glossiness_texture,
+                                  .channel = 3, .scale = -glossiness, .bias = 1.0f});
+            }
+        } else {
+            texture_on(node, {.field = "roughness", .texture = material_.metallic_roughness_texture, .channel = 1});
+        }
+        if ((slab.features & slab_anisotropy) != 0)
+            texture_on(node, {.field = "anisotropy", .texture = material_.anisotropy->texture, .channel = 2});
+        if ((slab.features & slab_fuzz) != 0) {
+            texture_on(node, {.field = "fuzz_color", .texture = material_.sheen->color_texture});
+            texture_on(node, {.field = "fuzz_roughness", .texture = material_.sheen->roughness_texture, .channel = 3});
+        }
+        if ((slab.features & slab_thin_film) != 0 && material_.iridescence->thickness_maximum > 0.0f) {
+            const float least = material_.iridescence->thickness_minimum / material_.iridescence->thickness_maximum;
+            texture_on(node, {.field = "film_thickness", .texture = material_.iridescence->thickness_texture, .channel = 1,
+                              .scale = 1.0f - least, .bias = least});
+        }
+        if ((slab.features & slab_emission) != 0) texture_on(node, {.field = "emission", .texture = material_.emissive_texture});
+        return node;
+    }
+
+    Slab dielectric() const {
+        Slab slab = common();
+        slab.albedo = base_color();
+        const float root = material_.ior == 0.0f ? 1.0f : (material_.ior - 1.0f) / (material_.ior + 1.0f);
+        slab.f0 = glm::vec3(root * root);
+        if (material_.specular) slab.f0 = unit(slab.f0 * material_.specular->color) * unit(material_.specular->factor);
+        return slab;
+    }
+
+    NodeIndex add_dielectric(const Slab& slab, const char* name) {
+        const NodeIndex node = add(slab, name);
+        texture_on(node, {.field = "albedo", .texture = material_.base_color_texture});
+        if (material_.specular) {
+            texture_on(node, {.field = "f0", .texture = material_.specular->color_texture});
+        }
+        return node;
+    }
+
+    NodeIndex base() {
+        if (material_.specular_glossiness) {
+            Slab slab = common();
+            slab.f0 = unit(material_.specular_glossiness->specular);
+            slab.albedo = unit(glm::vec3(material_.specular_glossiness->diffuse)) *
+                          (1.0f - std::max({slab.f0.r, slab.f0.g, slab.f0.b}));
+            slab.roughness = 1.0f - unit(material_.specular_glossiness->glossiness);
+            const NodeIndex node = add(slab, "specular-glossiness");
+            texture_on(node, {.field = "albedo", .texture = material_.specular_glossiness->diffuse_texture});
+            texture_on(node, {.field = "f0", .texture = material_.specular_glossiness->specular_glossiness_texture});
+            return node;
+        }
+        Slab metal = common();
+        metal.f0 = base_color();
+        metal.albedo = glm::vec3(0.0f);
+        const bool has_texture = material_.metallic_roughness_texture.present();
+        const float metallic = unit(material_.metallic);
+        if (metallic <= 0.0f) return add_dielectric(dielectric(), "dielectric");
+        const auto add_metal = [&] {
+            const NodeIndex node = add(metal, "metal");
+            texture_on(node, {.field = "f0", .texture = material_.base_color_texture});
+            return node;
+        };
+        if (metallic >= 1.0f && !has_texture) return add_metal();
+        const NodeIndex first = add_dielectric(dielectric(), "dielectric"), second = add_metal();
+        const NodeIndex mix = tree_.mix(first, second, metallic);
+        tree_.nodes[mix].parameter_blend = true;
+        texture_on(mix, {.field = "amount", .texture = material_.metallic_roughness_texture, .channel = 2});
+        return mix;
+    }
+
+    NodeIndex with_transmission(NodeIndex root) {
+        const float through = material_.transmission ? unit(material_.transmission->factor) : 0.0f;
+        const float scattered = material_.diffuse_transmission ? unit(material_.diffuse_transmission->factor) : 0.0f;
+        if (through > 0.0f) {
+            Slab glass = dielectric();
+            glass.features |= slab_medium;
+            glass.albedo = glm::vec3(0.0f);
+            if (material_.volume && material_.volume->thickness > 0.0f) {
+                glass.thickness = material_.volume->thickness;
+                glass.mean_free_path = mean_free_path_of(unit(material_.volume->attenuation_color), material_.volume->attenuation_distance);
+            } else {
+                tree_.thin = true;
+                glass.thickness = tree_.surface_thickness;
+                glass.mean_free_path = mean_free_path_of(base_color(), tree_.surface_thickness);
+            }
+            const NodeIndex node = add(glass, "transmissive");
+            root = tree_.mix(root, node, through);
+            texture_on(root, {.field = "amount", .texture = material_.transmission->texture});
+        } else if (scattered > 0.0f) {
+            // A sheet of about one mean free path: half of the light comes out on either side.
+            Slab sheet = dielectric();
+            sheet.features |= slab_medium;
+            sheet.albedo = unit(material_.diffuse_transmission->color);
+            tree_.thin = true;
+            sheet.thickness = tree_.surface_thickness;
+            sheet.mean_free_path = glm::vec3(tree_.surface_thickness);
+            const NodeIndex node = add(sheet, "sheet");
+            texture_on(node, {.field = "albedo", .texture = material_.diffuse_transmission->color_texture});
+            root = tree_.mix(root, node, scattered);
+            texture_on(root, {.field = "amount", .texture = material_.diffuse_transmission->texture, .channel = 3});
+        }
+        return root;
+    }
+
+    NodeIndex with_coat(NodeIndex root) {
+        if (!material_.clearcoat || !(material_.clearcoat->factor > 0.0f)) return root;
+        Slab coat;
+        coat.features = slab_medium;
+        coat.mean_free_path = glm::vec3(infinity);
+        coat.thickness = 1e-4f;
+        coat.albedo = glm::vec3(0.0f);
+        coat.roughness = unit(material_.clearcoat->roughness);
+        const std::uint32_t frame = tree_.add_frame({.normal_texture = material_.clearcoat->normal_texture});
+        NodeIndex top = tree_.add(coat, "clear coat", frame);
+        texture_on(top, {.field = "roughness", .texture = material_.clearcoat->roughness_texture, .channel = 1});
+        const float factor = unit(material_.clearcoat->factor);
+        if (factor < 1.0f || material_.clearcoat->texture.present()) {
+            top = tree_.coverage(top, factor);
+            texture_on(top, {.field = "amount", .texture = material_.clearcoat->texture});
+        }
+        return tree_.layer(top, root);
+    }
+
+    const MaterialDescription& material_;
+    Tree tree_;
+};
+
+}  // namespace
+
+Tree tree_of(const MaterialDescription& material) { return Builder(material).run(); }
+
+}  // namespace nacre::materials
