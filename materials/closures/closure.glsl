@@ -95,7 +95,7 @@ struct Closure {
 #ifdef NACRE_SLAB_SPECULAR_LUT
     uint specular_lut;
 #endif
-    float gloss;
+    float gloss;  // of the diffuse model
     vec3 diffuse;         // albedo of what leaves where it entered
     float diffuse_scale;  // one over the albedo of the diffuse lobe as it is
     float specular_probability;
@@ -140,6 +140,25 @@ vec3 specular_tint(uint index, float view_cosine, float light_cosine) {
     return clamp(specular_lut(index, vec2(saturated(view_cosine), saturated(light_cosine))), vec3(0.0), vec3(1.0));
 }
 #endif
+
+// The model of the opaque medium: 0 Chan over its albedo, 1 Lambert, 2 renormalized Disney as published. A shader's choice of
+// cost against error.
+#ifndef NACRE_DIFFUSE_MODEL
+#define NACRE_DIFFUSE_MODEL 0
+#endif
+#if NACRE_DIFFUSE_MODEL == 2
+#include "materials/closures/classic.glsl"
+#endif
+
+float diffuse_lobe(Closure closure, vec3 light) {
+#if NACRE_DIFFUSE_MODEL == 0
+    return closure.diffuse_scale * chan_diffuse(closure.view, light, closure.gloss);
+#elif NACRE_DIFFUSE_MODEL == 1
+    return lambert_diffuse(light);
+#else
+    return disney_diffuse(closure.view, light, closure.gloss);
+#endif
+}
 
 Closure prepare_closure(Slab slab, vec3 view, float footprint) {
     Closure closure;
@@ -196,10 +215,15 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 #endif
     }
 #endif
+#if NACRE_DIFFUSE_MODEL == 0
     closure.gloss = chan_gloss(slab.roughness);
+    closure.diffuse_scale = 1.0 / chan_albedo_by_table(min(closure.view.z, 1.0), closure.gloss);
+#else
+    closure.gloss = slab.roughness;
+    closure.diffuse_scale = 1.0;
+#endif
     vec3 entering = passed * uncovered;
     closure.diffuse = slab.albedo * entering;
-    closure.diffuse_scale = 1.0 / chan_albedo_by_table(min(closure.view.z, 1.0), closure.gloss);
 #ifdef NACRE_SLAB_SPECULAR_LUT
     closure.specular_lut = slab.specular_lut;
     if ((slab.features & slab_specular_lut) != 0u) {
@@ -296,7 +320,7 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
 #ifdef NACRE_SLAB_FUZZ
     if ((closure.features & slab_fuzz) != 0u) value.specular += closure.fuzz * sheen_density(closure.fuzz_map, light);
 #endif
-    value.diffuse = closure.diffuse * (closure.diffuse_scale * chan_diffuse(closure.view, light, closure.gloss));
+    value.diffuse = closure.diffuse * diffuse_lobe(closure, light);
 #ifdef NACRE_SLAB_MEDIUM
     if ((closure.features & slab_medium) != 0u) {
         value.diffuse += closure.thin * (light.z / pi);

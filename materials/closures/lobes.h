@@ -36,6 +36,7 @@ struct Lobes {
 #include "materials/closures/fresnel.glsl"
 #include "materials/closures/ggx.glsl"
 #include "materials/closures/diffuse.glsl"
+#include "materials/closures/classic.glsl"
 #include "materials/closures/fuzz.glsl"
 #include "materials/closures/haze.glsl"
 #include "materials/closures/thin_film.glsl"
