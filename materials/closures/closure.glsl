@@ -9,6 +9,9 @@
 #ifdef NACRE_SLAB_FUZZ
 #include "materials/closures/fuzz.glsl"
 #endif
+#ifdef NACRE_SLAB_GLINTS
+#include "materials/closures/glints.glsl"
+#endif
 #ifdef NACRE_SLAB_MEDIUM
 #include "materials/closures/medium.glsl"
 #endif
@@ -91,6 +94,12 @@ struct Closure {
     vec3 depth;         // optical, along the normal
     float reflectance;  // of the interface at normal incidence, mean of the channels: tells how directions refract
     float transmission_probability;
+#endif
+#ifdef NACRE_SLAB_GLINTS
+    float glint_density;
+    vec2 glint_position;
+    vec2 glint_dx;
+    vec2 glint_dy;
 #endif
 #ifdef NACRE_SLAB_SPECULAR_LUT
     uint specular_lut;
@@ -185,6 +194,12 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 #endif
     closure.specular = make_specular_lobe(closure.fresnel, closure.view, slab.roughness, anisotropy);
     vec3 passed = closure.specular.passed;
+#ifdef NACRE_SLAB_GLINTS
+    closure.glint_density = slab.glint_density;
+    closure.glint_position = slab.glint_position;
+    closure.glint_dx = slab.glint_dx;
+    closure.glint_dy = slab.glint_dy;
+#endif
 #ifdef NACRE_SLAB_SECOND_LOBE
     closure.second_probability = 0.0;
     if ((slab.features & slab_second_lobe) != 0u) {
@@ -309,6 +324,12 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
     if (light.z <= 0.0) return value;
     vec3 h = half_vector(closure.view, light);
     vec3 lobes = specular_lobe_value(closure.specular, closure.view, light, h);
+#ifdef NACRE_SLAB_GLINTS
+    // The second lobe stays smooth: it is the haze around the facets.
+    if ((closure.features & slab_glints) != 0u && !closure.specular.is_mirror)
+        lobes *= glint_factor(h, closure.specular.alpha, closure.glint_density, closure.glint_position, closure.glint_dx,
+                              closure.glint_dy);
+#endif
 #ifdef NACRE_SLAB_SECOND_LOBE
     if ((closure.features & slab_second_lobe) != 0u) lobes += specular_lobe_value(closure.second, closure.view, light, h);
 #endif

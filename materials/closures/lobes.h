@@ -38,6 +38,7 @@ struct Lobes {
 #include "materials/closures/diffuse.glsl"
 #include "materials/closures/classic.glsl"
 #include "materials/closures/fuzz.glsl"
+#include "materials/closures/glints.glsl"
 #include "materials/closures/haze.glsl"
 #include "materials/closures/thin_film.glsl"
 #undef const
