@@ -3,8 +3,9 @@
 #define NACRE_CLOSURES_CLASSIC
 #include "materials/closures/math.glsl"
 
-// Lobes that real-time renderers are used to, as published, beside those that the slab is made of: cheaper, with errors that are
-// measured (docs/materials.md). Roughness is perceptual; alpha is its square. Diffuse lobes include the cosine of light.
+// Lobes that real-time renderers are used to, as published, beside those that the slab is made of: cheaper, with errors
+// that are measured (docs/materials.md). Roughness is perceptual; alpha is its square. Diffuse lobes include the cosine
+// of light.
 
 // Source: Burley 2012 and Lagarde and de Rousiers 2014, "Moving Frostbite to physically based rendering".
 float disney_diffuse(vec3 view, vec3 light, float roughness) {
@@ -16,8 +17,8 @@ float disney_diffuse(vec3 view, vec3 light, float roughness) {
     return light_scatter * view_scatter * mix(1.0, 1.0 / 1.51, roughness) * light.z / pi;
 }
 
-// Diffuse of woven fabric: darker the rougher, and wrapped around the terminator by w (0.5 as published). The wrapped cosine is
-// normalized: what the lobe of roughness 0 reflects of white light stays 1.
+// Diffuse of woven fabric: darker the rougher, and wrapped around the terminator by w (0.5 as published). The wrapped
+// cosine is normalized: what the lobe of roughness 0 reflects of white light stays 1.
 float fabric_diffuse(vec3 light, float roughness, float wrap) {
     float wrapped = saturated((light.z + wrap) / square(1.0 + wrap));
     return mix(1.0, 0.5, roughness) * wrapped / pi;
@@ -44,8 +45,8 @@ float ashikhmin_distribution(float normal_half, float alpha) {
     return (4.0 * exp(-cos2 / (sin2 * a2)) + sin4) / (pi * (1.0 + 4.0 * a2) * sin4);
 }
 
-// Source: Estevez and Kulla 2017, "Production friendly microfacet sheen BRDF". Below a roughness of 0.1 it reflects more than it
-// gets with most visibilities.
+// Source: Estevez and Kulla 2017, "Production friendly microfacet sheen BRDF". Below a roughness of 0.1 it reflects
+// more than it gets with most visibilities.
 float charlie_distribution(float normal_half, float roughness) {
     float exponent = 1.0 / clamp(roughness, 0.01, 1.0);
     float sin2 = clamp(1.0 - normal_half * normal_half, 1e-9, 1.0);

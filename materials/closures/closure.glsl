@@ -20,27 +20,28 @@
 #endif
 // A slab seen from one direction: everything that depends on slab and view is computed once, lights follow.
 //
-// All vectors are unit and in the local frame: z is the normal, x the tangent, y the bitangent; they point away from the
-// surface. Light directions below the surface (z < 0) ask for what the medium scatters through. Values include the cosine to
-// the light. Angles down to 1e-7 rad above the surface are handled; a view below that is moved there.
+// All vectors are unit and in the local frame: z is the normal, x the tangent, y the bitangent; they point away from
+// the surface. Light directions below the surface (z < 0) ask for what the medium scatters through. Values include the
+// cosine to the light. Angles down to 1e-7 rad above the surface are handled; a view below that is moved there.
 //
 //     Closure prepare_closure(Slab slab, vec3 view, float footprint)
-//         footprint: meters that a pixel (or ray cone) covers on the surface; decides what the medium scatters within it
+//         footprint: meters that a pixel (or ray cone) covers on the surface; tells what the medium scatters within it
 //     ClosureValue evaluate_closure(Closure closure, vec3 light)
 //     ClosureSample sample_closure(Closure closure, vec3 random)      random: [0, 1)^3
 //     float closure_pdf(Closure closure, vec3 light)                  solid angle, of sample_closure without mirrors
-//     ClosureAlbedo closure_albedo(Closure closure)                   towards the view, under white light from everywhere
-//     vec3 closure_transmittance(Closure closure, float cos_theta)    straight through the medium, from an outer direction
-//     vec3 closure_throughput(Closure closure)                        view: through fuzz, interface and medium, to what is below
+//     ClosureAlbedo closure_albedo(Closure closure)                   to the view, under white light from everywhere
+//     vec3 closure_transmittance(Closure closure, float cos_theta)    straight through the medium, by outer direction
+//     vec3 closure_throughput(Closure closure)                        of the view: through fuzz, interface and medium
 //     float slab_coverage(Slab slab, float cos_theta)                 where a slab may have slab_edge_coverage
-//     vec3 internal_reflectance(Slab slab)                            of diffuse light that hits the interface from below
+//     vec3 internal_reflectance(Slab slab)                            K, of diffuse light from the medium's side
 //     vec3 bounce_factor(vec3 internal, vec3 base_albedo)             (1 - K) / (1 - E_b K)
 //
 // Who includes this provides the tables (materials/closures/tables.glsl, medium.glsl) and, where a slab may have
 // slab_specular_lut, vec3 specular_lut(uint index, vec2 at): the tint by the cosines of view and light to the normal.
 //
-// What is not reciprocal: compensation, fuzz, thin film and what the interface leaves to the medium are computed towards the view only.
-// Energy is kept exactly that way (up to the error of the tables), and nothing but the lobes is computed for each light.
+// What is not reciprocal: compensation, fuzz, thin film and what the interface leaves to the medium are computed
+// towards the view only. Energy is kept exactly that way (up to the error of the tables), and nothing but the lobes is
+// computed for each light.
 
 struct ClosureValue {
     vec3 specular;    // interface and fuzz
@@ -66,9 +67,9 @@ struct ClosureAlbedo {
 struct SpecularLobe {
     vec2 alpha;
     float view_length;
-    vec3 scale;      // on single scattering: compensation for multiple scattering, share of the lobe, what fuzz lets through
-    vec3 albedo;     // scale included
-    vec3 passed;     // 1 - albedo of the lobe alone, with all its digits
+    vec3 scale;   // on single scattering: compensation for multiple, share of the lobe, what fuzz lets through
+    vec3 albedo;  // scale included
+    vec3 passed;  // 1 - albedo of the lobe alone, with all its digits
     bool is_mirror;
 };
 
@@ -104,7 +105,7 @@ struct Closure {
 #ifdef NACRE_SLAB_SPECULAR_LUT
     uint specular_lut;
 #endif
-    float gloss;  // of the diffuse model
+    float gloss;          // of the diffuse model
     vec3 diffuse;         // albedo of what leaves where it entered
     float diffuse_scale;  // one over the albedo of the diffuse lobe as it is
     float specular_probability;
@@ -150,8 +151,8 @@ vec3 specular_tint(uint index, float view_cosine, float light_cosine) {
 }
 #endif
 
-// The model of the opaque medium: 0 Chan over its albedo, 1 Lambert, 2 renormalized Disney as published. A shader's choice of
-// cost against error.
+// The model of the opaque medium: 0 Chan over its albedo, 1 Lambert, 2 renormalized Disney as published. A shader's
+// choice of cost against error.
 #ifndef NACRE_DIFFUSE_MODEL
 #define NACRE_DIFFUSE_MODEL 0
 #endif
@@ -327,11 +328,12 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
 #ifdef NACRE_SLAB_GLINTS
     // The second lobe stays smooth: it is the haze around the facets.
     if ((closure.features & slab_glints) != 0u && !closure.specular.is_mirror)
-        lobes *= glint_factor(h, closure.specular.alpha, closure.glint_density, closure.glint_position, closure.glint_dx,
-                              closure.glint_dy);
+        lobes *= glint_factor(h, closure.specular.alpha, closure.glint_density, closure.glint_position,
+                              closure.glint_dx, closure.glint_dy);
 #endif
 #ifdef NACRE_SLAB_SECOND_LOBE
-    if ((closure.features & slab_second_lobe) != 0u) lobes += specular_lobe_value(closure.second, closure.view, light, h);
+    if ((closure.features & slab_second_lobe) != 0u)
+        lobes += specular_lobe_value(closure.second, closure.view, light, h);
 #endif
     value.specular = lobes * fresnel_reflectance(closure.fresnel, half_vector_cosine(closure.view, light));
 #ifdef NACRE_SLAB_SPECULAR_LUT
@@ -481,8 +483,8 @@ float slab_coverage(Slab slab, float cos_theta) {
 }
 #endif
 
-// Of diffuse light that hits the interface from the medium's side: what leaves through a denser medium's surface is what enters
-// it, spread over index^2 times the angle.
+// Of diffuse light that hits the interface from the medium's side: what leaves through a denser medium's surface is
+// what enters it, spread over index^2 times the angle.
 float internal_reflectance_of(float f0, float mean) { return 1.0 - (1.0 - mean) / square(reflectance_to_ior(f0)); }
 
 vec3 internal_reflectance(Slab slab) {
@@ -492,8 +494,8 @@ vec3 internal_reflectance(Slab slab) {
                 internal_reflectance_of(slab.f0.z, mean.z));
 }
 
-// What a diffuse base of albedo base_albedo under an interface sends out, relative to its first bounce: the light that the
-// interface throws back hits the base again, and again. Source: OpenPBR, "Coat darkening".
+// What a diffuse base of albedo base_albedo under an interface sends out, relative to its first bounce: the light that
+// the interface throws back hits the base again, and again. Source: OpenPBR, "Coat darkening".
 vec3 bounce_factor(vec3 internal, vec3 base_albedo) {
     vec3 passed = vec3(1.0) - internal;
     // Written so that nothing is lost where both are 1.

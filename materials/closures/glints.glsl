@@ -3,11 +3,11 @@
 #define NACRE_CLOSURES_GLINTS
 #include "materials/closures/ggx.glsl"
 
-// A microfacet surface of which the pixel sees only some facets: the smooth lobe times (facets that reflect towards the view)
-// over (how many would on average). The number of facets in a cell of the surface and a cell of slopes is drawn from a Poisson
-// distribution, always the same for the same cell. So the mean over the surface is the smooth lobe whatever the density, and
-// the lobe itself is the limit of many facets, for any distribution of normals.
-// Source of the idea of drawing counts instead of facets: Jakob et al. 2014, "Discrete stochastic microfacet models"; Deliot and
+// A microfacet surface of which the pixel sees only some facets: the smooth lobe times (facets that reflect towards the
+// view) over (how many would on average). The number of facets in a cell of the surface and a cell of slopes is drawn
+// from a Poisson distribution, always the same for the same cell. So the mean over the surface is the smooth lobe
+// whatever the density, and the lobe itself is the limit of many facets, for any distribution of normals. Source of the
+// idea of drawing counts instead of facets: Jakob et al. 2014, "Discrete stochastic microfacet models"; Deliot and
 // Belcour 2023, "Real-time rendering of glinty appearances using distributed binomial laws on anisotropic grids".
 
 // Cells of slopes for each alpha along an axis: a facet is as flat as one of them is wide.
@@ -91,13 +91,14 @@ float glint_factor(vec3 h, vec2 alpha, float density, vec2 position, vec2 dx, ve
     // Share of the facets whose slopes lie in one cell: the density of slopes times the area of a cell.
     float stretched = 1.0 + slope_x * slope_x + slope_y * slope_y;
     float share = 1.0 / (pi * stretched * stretched * glint_slope_cells * glint_slope_cells);
-    // Cells as large as the footprint, but not smaller than what holds one facet: nearer than that, a facet fills the pixel.
+    // Cells as large as the footprint, but not smaller than what holds one facet: nearer than that, a facet fills the
+    // pixel.
     float footprint = abs(dx.x * dy.y - dx.y * dy.x);
     float level = 0.5 * log2(clamp(max(footprint, 1.0 / density), 1e-24, 1e24));
     float lower = floor(level);
     vec2 slope = vec2(slope_x, slope_y) * glint_slope_cells;
-    return mix(glint_cells(position, lower, slope, density, share), glint_cells(position, lower + 1.0, slope, density, share),
-               level - lower);
+    return mix(glint_cells(position, lower, slope, density, share),
+               glint_cells(position, lower + 1.0, slope, density, share), level - lower);
 }
 
 #endif

@@ -26,7 +26,8 @@ TEST(Classic, DistributionsCoverTheSurface) {
     for (const double roughness : {0.1, 0.3, 0.6, 1.0})
         EXPECT_NEAR(projected_area([&](double c) { return library.charlie_distribution(c, roughness); }), 1.0, 1e-3);
     for (const double alpha : {0.3, 0.6, 1.0})
-        EXPECT_NEAR(projected_area([&](double c) { return library.ashikhmin_distribution(c, alpha); }), 1.0, 2e-3) << alpha;
+        EXPECT_NEAR(projected_area([&](double c) { return library.ashikhmin_distribution(c, alpha); }), 1.0, 2e-3)
+            << alpha;
 }
 
 double fiber_albedo(Library& library, double cosine, double roughness, int visibility) {
@@ -73,7 +74,8 @@ TEST(Classic, DiffuseModelsAgainstWhite) {
     double sum = 0.0;
     for (int i = 0; i < 10000; ++i) {
         const double z = -1.0 + 2.0 * (i + 0.5) / 10000.0;
-        sum += library.fabric_diffuse({std::sqrt(1.0 - z * z), 0.0, z}, 0.0, 0.5) * 2.0 * std::numbers::pi * 2.0 / 10000.0;
+        sum +=
+            library.fabric_diffuse({std::sqrt(1.0 - z * z), 0.0, z}, 0.0, 0.5) * 2.0 * std::numbers::pi * 2.0 / 10000.0;
     }
     EXPECT_NEAR(sum, 1.0, 1e-4);
 }
@@ -86,7 +88,8 @@ TEST(Classic, KelemenIsExactForMirrorsAndTheCoatFitIsClose) {
     }
     double largest = 0.0;
     for (int i = 0; i <= 100; ++i)
-        largest = std::max(largest, std::abs(library.reflectance_under_coat_fit(i / 100.0) - library.reflectance_under(std::min(i / 100.0, 0.98), 1.5)));
+        largest = std::max(largest, std::abs(library.reflectance_under_coat_fit(i / 100.0) -
+                                             library.reflectance_under(std::min(i / 100.0, 0.98), 1.5)));
     EXPECT_LT(largest, 0.1);
     std::printf("coat fit is off by %.3f\n", largest);
 }

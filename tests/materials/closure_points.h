@@ -50,8 +50,8 @@ inline const std::vector<double>& roughnesses() {
     return values;
 }
 
-/// What a closure sends towards its view under white light from everywhere, also from below: lobe by lobe, each by its own sampler over a
-/// stratified grid. `strata` squared samples per lobe; 64 are good for 1e-4.
+/// What a closure sends towards its view under white light from everywhere, also from below: lobe by lobe, each by its
+/// own sampler over a stratified grid. `strata` squared samples per lobe; 64 are good for 1e-4.
 inline glm::dvec3 integrate(Library& library, const Library::Closure& closure, int strata) {
     Library::Closure none = closure;
     none.diffuse = none.fuzz = none.thin = none.subsurface = none.transmission = glm::dvec3(0.0);

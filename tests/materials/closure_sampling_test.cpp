@@ -18,8 +18,8 @@ double chi_square_tail(double statistic, double degrees) {
     return 0.5 * std::erfc(z / std::numbers::sqrt2);
 }
 
-/// Directions in bins around an axis: rings whose angles to it grow exponentially, so that narrow lobes around the mirrored
-/// view get as many bins as wide ones.
+/// Directions in bins around an axis: rings whose angles to it grow exponentially, so that narrow lobes around the
+/// mirrored view get as many bins as wide ones.
 struct Bins {
     static constexpr int rings = 80, sectors = 160;
     glm::dvec3 axis, right, up;
@@ -48,42 +48,49 @@ struct Bins {
     }
     /// Integral of the density over a part of a bin, halving it until its midpoints agree.
     template <typename Density>
-    double integral(const Density& density, double ring, double sector, double ring_size, double sector_size, int depth) const {
+    double integral(const Density& density, double ring, double sector, double ring_size, double sector_size,
+                    int depth) const {
         const auto sum = [&](int count) {
             double result = 0.0;
             for (int i = 0; i < count; ++i) {
                 const double low = ring + ring_size * i / count, high = ring + ring_size * (i + 1) / count;
                 // 1 - cos by half angles.
-                const double area = 2.0 * (std::pow(std::sin(0.5 * angle_at(high)), 2.0) - std::pow(std::sin(0.5 * angle_at(low)), 2.0)) *
-                                    2.0 * std::numbers::pi * sector_size / count / sectors;
+                const double area =
+                    2.0 *
+                    (std::pow(std::sin(0.5 * angle_at(high)), 2.0) - std::pow(std::sin(0.5 * angle_at(low)), 2.0)) *
+                    2.0 * std::numbers::pi * sector_size / count / sectors;
                 for (int j = 0; j < count; ++j)
-                    result += area * density(direction_at(ring + ring_size * (i + 0.5) / count, sector + sector_size * (j + 0.5) / count));
+                    result += area * density(direction_at(ring + ring_size * (i + 0.5) / count,
+                                                          sector + sector_size * (j + 0.5) / count));
             }
             return result;
         };
         double lowest = 1.0, highest = -1.0;
         for (int corner = 0; corner < 5; ++corner) {
-            const double z = corner == 4 ? direction_at(ring + 0.5 * ring_size, sector + 0.5 * sector_size).z
-                                         : direction_at(ring + ring_size * (corner & 1), sector + sector_size * (corner >> 1)).z;
+            const double z =
+                corner == 4 ? direction_at(ring + 0.5 * ring_size, sector + 0.5 * sector_size).z
+                            : direction_at(ring + ring_size * (corner & 1), sector + sector_size * (corner >> 1)).z;
             lowest = std::min(lowest, z);
             highest = std::max(highest, z);
         }
         // Densities end at the surface, and some lobes lie along it: midpoints may all miss that.
         const bool is_at_surface = lowest < 0.1 && highest > 0.0 && highest - lowest > 0.02 * highest;
         const double coarse = sum(2), fine = sum(4);
-        if (depth == 0 || (!(is_at_surface && depth > 5) && std::abs(coarse - fine) < 2e-3 * fine + 1e-8)) return fine + (fine - coarse) / 3.0;
+        if (depth == 0 || (!(is_at_surface && depth > 5) && std::abs(coarse - fine) < 2e-3 * fine + 1e-8))
+            return fine + (fine - coarse) / 3.0;
         double result = 0.0;
         for (int i = 0; i < 2; ++i)
             for (int j = 0; j < 2; ++j)
-                result += integral(density, ring + 0.5 * i * ring_size, sector + 0.5 * j * sector_size, 0.5 * ring_size, 0.5 * sector_size, depth - 1);
+                result += integral(density, ring + 0.5 * i * ring_size, sector + 0.5 * j * sector_size, 0.5 * ring_size,
+                                   0.5 * sector_size, depth - 1);
         return result;
     }
 };
 
 /// Smallest probability, over several sizes of bins, that honest samples look as unlike the density as these.
 /// `scale`: what the density is wrong by.
-double smallest_probability(Library& library, const Library::Closure& closure, double narrowest, long samples, std::uint64_t seed,
-                            double scale = 1.0) {
+double smallest_probability(Library& library, const Library::Closure& closure, double narrowest, long samples,
+                            std::uint64_t seed, double scale = 1.0) {
     const glm::dvec3 view = closure.view;
     const Bins bins({-view.x, -view.y, view.z}, std::clamp(narrowest, 1e-5, 1.0));
     const auto density = [&](const glm::dvec3& w) { return scale * library.closure_pdf(closure, w); };
@@ -148,23 +155,42 @@ struct Case {
 std::vector<Case> cases() {
     std::vector<Case> result;
     for (const float roughness : {0.02f, 0.3f, 1.0f})
-        result.push_back({"metal " + std::to_string(roughness), {.f0 = glm::vec3(0.8f), .roughness = roughness, .albedo = glm::vec3(0.0f)}});
+        result.push_back({"metal " + std::to_string(roughness),
+                          {.f0 = glm::vec3(0.8f), .roughness = roughness, .albedo = glm::vec3(0.0f)}});
     for (const float anisotropy : {-0.6f, 0.9f})
         result.push_back({"stretched " + std::to_string(anisotropy),
-                          {.features = slab_anisotropy, .f0 = glm::vec3(0.8f), .roughness = 0.5f, .albedo = glm::vec3(0.0f), .anisotropy = anisotropy}});
+                          {.features = slab_anisotropy,
+                           .f0 = glm::vec3(0.8f),
+                           .roughness = 0.5f,
+                           .albedo = glm::vec3(0.0f),
+                           .anisotropy = anisotropy}});
     result.push_back({"diffuse", {.f0 = glm::vec3(0.0f), .roughness = 0.7f}});
     result.push_back({"plastic", {.f0 = glm::vec3(0.04f), .roughness = 0.3f, .albedo = glm::vec3(0.5f)}});
     result.push_back({"mirror over diffuse", {.f0 = glm::vec3(0.3f), .roughness = 0.0f, .albedo = glm::vec3(0.5f)}});
     for (const float roughness : {0.1f, 0.7f})
         result.push_back({"fuzz " + std::to_string(roughness),
-                          {.features = slab_fuzz, .f0 = glm::vec3(0.0f), .albedo = glm::vec3(0.0f), .fuzz_amount = 1.0f, .fuzz_roughness = roughness}});
+                          {.features = slab_fuzz,
+                           .f0 = glm::vec3(0.0f),
+                           .albedo = glm::vec3(0.0f),
+                           .fuzz_amount = 1.0f,
+                           .fuzz_roughness = roughness}});
     result.push_back({"thin",
-                      {.features = slab_medium, .f0 = glm::vec3(0.04f), .roughness = 0.4f, .albedo = {0.9f, 0.7f, 0.8f},
-                       .mean_free_path = glm::vec3(1e-3f), .thickness = 1e-3f}});
+                      {.features = slab_medium,
+                       .f0 = glm::vec3(0.04f),
+                       .roughness = 0.4f,
+                       .albedo = {0.9f, 0.7f, 0.8f},
+                       .mean_free_path = glm::vec3(1e-3f),
+                       .thickness = 1e-3f}});
     result.push_back({"everything",
-                      {.features = slab_anisotropy | slab_second_lobe | slab_fuzz, .f0 = {0.5f, 0.2f, 0.1f}, .roughness = 0.3f,
-                       .albedo = {0.1f, 0.6f, 0.2f}, .anisotropy = 0.5f, .second_roughness = 0.7f, .second_weight = 0.4f,
-                       .fuzz_amount = 0.5f, .fuzz_roughness = 0.3f}});
+                      {.features = slab_anisotropy | slab_second_lobe | slab_fuzz,
+                       .f0 = {0.5f, 0.2f, 0.1f},
+                       .roughness = 0.3f,
+                       .albedo = {0.1f, 0.6f, 0.2f},
+                       .anisotropy = 0.5f,
+                       .second_roughness = 0.7f,
+                       .second_weight = 0.4f,
+                       .fuzz_amount = 0.5f,
+                       .fuzz_roughness = 0.3f}});
     return result;
 }
 
@@ -185,7 +211,8 @@ TEST(ClosureSampling, SamplesFollowTheDensity) {
     for (const Case& test : all) {
         for (const double cosine : view_angles) {
             const auto closure = library.prepare_closure(Library::slab_of(test.slab), direction(cosine, 0.4), 1e-3);
-            EXPECT_GT(smallest_probability(library, closure, narrowest_angle(test.slab, cosine), samples, ++seed), limit)
+            EXPECT_GT(smallest_probability(library, closure, narrowest_angle(test.slab, cosine), samples, ++seed),
+                      limit)
                 << test.name << " seen at cosine " << cosine;
         }
     }
@@ -196,7 +223,10 @@ TEST(ClosureSampling, ADensityThatIsWrongByOnePercentIsFound) {
     for (const Case& test : cases()) {
         if (test.name != "stretched 0.900000" && test.name != "diffuse" && test.name != "everything") continue;
         const auto closure = library.prepare_closure(Library::slab_of(test.slab), direction(0.25, 0.4), 1e-3);
-        EXPECT_LT(smallest_probability(library, closure, narrowest_angle(test.slab, 0.25), sample_count(500000), 7, 1.01), 1e-5) << test.name;
+        EXPECT_LT(
+            smallest_probability(library, closure, narrowest_angle(test.slab, 0.25), sample_count(500000), 7, 1.01),
+            1e-5)
+            << test.name;
     }
 }
 

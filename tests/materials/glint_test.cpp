@@ -16,7 +16,8 @@ Moments over_the_surface(Library& library, const glm::dvec3& h, double density, 
     double sum = 0.0, squares = 0.0;
     for (int i = 0; i < samples; ++i) {
         const glm::dvec2 position(random(-1e3, 1e3), random(-1e3, 1e3));
-        const double factor = library.glint_factor(h, {0.2, 0.2}, density, position, {footprint, 0.0}, {0.0, footprint});
+        const double factor =
+            library.glint_factor(h, {0.2, 0.2}, density, position, {footprint, 0.0}, {0.0, footprint});
         sum += factor;
         squares += factor * factor;
     }
@@ -31,7 +32,8 @@ TEST(Glints, TheMeanOverTheSurfaceIsTheLobeAtEveryDensity) {
             const int samples = 50000;
             const Moments moments = over_the_surface(library, h, density, 0.3, samples);
             // Four standard errors of the mean, or the 1 % that is asked for where that is more.
-            EXPECT_NEAR(moments.mean, 1.0, std::max(4.0 * moments.deviation / std::sqrt(samples), 1e-6)) << density << " " << h.z;
+            EXPECT_NEAR(moments.mean, 1.0, std::max(4.0 * moments.deviation / std::sqrt(samples), 1e-6))
+                << density << " " << h.z;
         }
     }
 }
@@ -71,7 +73,11 @@ TEST(Glints, APlaceAlwaysGlitsTheSameAndMovesWithoutAStep) {
 
 TEST(Glints, AClosureWithGlintsIsTheLobeTimesTheFactor) {
     Library library;
-    Slab slab{.features = slab_glints, .f0 = glm::vec3(0.8f), .roughness = 0.4f, .albedo = glm::vec3(0.0f), .glint_density = 300.0f};
+    Slab slab{.features = slab_glints,
+              .f0 = glm::vec3(0.8f),
+              .roughness = 0.4f,
+              .albedo = glm::vec3(0.0f),
+              .glint_density = 300.0f};
     slab.glint_dx = {0.1f, 0.0f};
     slab.glint_dy = {0.0f, 0.1f};
     const glm::dvec3 view = direction(0.8, 0.0), light = direction(0.75, 3.0);
@@ -79,7 +85,8 @@ TEST(Glints, AClosureWithGlintsIsTheLobeTimesTheFactor) {
     const int count = 20000;
     Slab smooth = slab;
     smooth.features = 0;
-    const double expected = library.evaluate_closure(library.prepare_closure(Library::slab_of(smooth), view, 1e-3), light).specular.x;
+    const double expected =
+        library.evaluate_closure(library.prepare_closure(Library::slab_of(smooth), view, 1e-3), light).specular.x;
     Random random(12);
     for (int i = 0; i < count; ++i) {
         slab.glint_position = {static_cast<float>(random(-100.0, 100.0)), static_cast<float>(random(-100.0, 100.0))};

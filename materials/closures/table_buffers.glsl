@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef NACRE_CLOSURES_TABLE_BUFFERS
+#define NACRE_CLOSURES_TABLE_BUFFERS
+// The tables that the closures ask for, out of buffers that hold their words as they are, two in each uint. Who
+// includes this has declared uint interface_words[] and, where slabs have the features, anisotropy_words[] and
+// medium_words[]. Reading them interpolated is the same on every device, which a texture's filter is not.
+
+vec4 interface_entry(int column, int row) {
+    int at = 2 * (row * 64 + column);
+    return vec4(unpackUnorm2x16(interface_words[at]), unpackUnorm2x16(interface_words[at + 1]));
+}
+
+vec4 interface_table(vec2 at) {
+    vec2 place = clamp(at, vec2(0.0), vec2(1.0)) * vec2(63.0, 95.0);
+    ivec2 entry = min(ivec2(place), ivec2(62, 94));
+    vec2 part = place - vec2(entry);
+    return mix(mix(interface_entry(entry.x, entry.y), interface_entry(entry.x + 1, entry.y), part.x),
+               mix(interface_entry(entry.x, entry.y + 1), interface_entry(entry.x + 1, entry.y + 1), part.x), part.y);
+}
+
+#ifdef NACRE_SLAB_MEDIUM
+vec2 medium_row(ivec3 at, vec3 part) {
+    int word = (at.z * 41 + at.y) * 16 + at.x;
+    return mix(unpackUnorm2x16(medium_words[word]), unpackUnorm2x16(medium_words[word + 1]), part.x);
+}
+
+vec2 medium_slice(ivec3 at, vec3 part) {
+    return mix(medium_row(at, part), medium_row(ivec3(at.x, at.y + 1, at.z), part), part.y);
+}
+
+vec2 medium_table(vec3 at) {
+    vec3 place = clamp(at, vec3(0.0), vec3(1.0)) * vec3(15.0, 40.0, 23.0);
+    ivec3 entry = min(ivec3(place), ivec3(14, 39, 22));
+    vec3 part = place - vec3(entry);
+    return mix(medium_slice(entry, part), medium_slice(ivec3(entry.x, entry.y, entry.z + 1), part), part.z);
+}
+#endif
+
+#ifdef NACRE_SLAB_ANISOTROPY
+vec2 anisotropy_table(vec4 at) {
+    vec4 place = clamp(at, vec4(0.0), vec4(1.0)) * vec4(11.0, 9.0, 11.0, 10.0);
+    ivec4 entry = min(ivec4(place), ivec4(10, 8, 10, 9));
+    vec4 part = place - vec4(entry);
+    vec2 sum = vec2(0.0);
+    for (int corner = 0; corner < 16; ++corner) {
+        ivec4 offset = ivec4(corner & 1, corner >> 1 & 1, corner >> 2 & 1, corner >> 3);
+        vec4 weight = mix(vec4(1.0) - part, part, vec4(offset));
+        ivec4 index = entry + offset;
+        int word = ((index.w * 12 + index.z) * 10 + index.y) * 12 + index.x;
+        sum += weight.x * weight.y * weight.z * weight.w * unpackUnorm2x16(anisotropy_words[word]);
+    }
+    return sum;
+}
+#endif
+
+#endif
