@@ -4,9 +4,7 @@
 #include "materials/closures/math.glsl"
 // A layer of a scattering and absorbing medium between two planes, from opaque to empty. Who includes this has defined
 //
-//     vec2 medium_table(vec3 at)    materials/tables/medium_table.h, trilinear, (0, 0, 0) and (1, 1, 1) being the first
-//     and the
-//                                   last entry
+//     vec2 medium_table(vec3 at)    materials/tables/medium_table.h, interpolated as those of tables.glsl
 
 // Lengths that are divided stay between these: meters.
 const float shortest_length = 1e-12;

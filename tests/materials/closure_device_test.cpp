@@ -289,7 +289,7 @@ TEST(ClosureFeatures, WhatASlabDoesNotUseDoesNotExist) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Backends, ClosureOnDevice, ::testing::Values("cpu", "vulkan"),
+INSTANTIATE_TEST_SUITE_P(Backends, ClosureOnDevice, ::testing::Values("cpu", "vulkan", "gl"),
                          [](const auto& parameter) { return std::string(parameter.param); });
 
 }  // namespace
