@@ -23,7 +23,7 @@ struct Furnace {
 };
 
 /// The slab at all roughnesses and from all views.
-Furnace furnace_of(Slab slab, const std::vector<float>& anisotropies = {0.0f}) {
+Furnace furnace_of(Slab slab, const std::vector<float>& anisotropies = {0.0f}, int strata = 64) {
     Library library;
     Furnace furnace;
     for (const double roughness : roughnesses()) {
@@ -33,7 +33,7 @@ Furnace furnace_of(Slab slab, const std::vector<float>& anisotropies = {0.0f}) {
             for (const double cosine : view_cosines()) {
                 for (const double phi : anisotropies.size() > 1 ? std::vector{0.0, 0.8, 1.5708} : std::vector{0.3}) {
                     const auto closure = library.prepare_closure(Library::slab_of(slab), direction(cosine, phi), 1e-3);
-                    furnace.add(integrate(library, closure, 64) + library.closure_throughput(closure),
+                    furnace.add(integrate(library, closure, strata) + library.closure_throughput(closure),
                                 "roughness " + std::to_string(roughness) + " anisotropy " + std::to_string(anisotropy) +
                                     " cosine " + std::to_string(cosine) + " phi " + std::to_string(phi));
                 }
@@ -55,10 +55,10 @@ TEST(Closure, WhiteMetalLosesNothing) {
 TEST(Closure, WhiteStretchedMetalLosesNothingUpToItsTable) {
     // Four dimensions in 64 KiB: the table is off by 0.8 % where one alpha is 39 times the other, and more beyond.
     const Furnace most = furnace_of({.features = slab_anisotropy, .f0 = glm::vec3(1.0f), .albedo = glm::vec3(0.0f)},
-                                    {-0.9f, 0.3f, 0.95f});
+                                    {-0.9f, 0.3f, 0.95f}, 40);
     EXPECT_LE(most.largest, 1.01) << most.where;
     EXPECT_GE(most.smallest, 0.99) << most.where;
-    const Furnace all = furnace_of({.features = slab_anisotropy, .f0 = glm::vec3(0.04f)}, {-1.0f, 0.999f});
+    const Furnace all = furnace_of({.features = slab_anisotropy, .f0 = glm::vec3(0.04f)}, {-1.0f, 0.999f}, 40);
     EXPECT_LE(all.largest, 1.05) << all.where;
     EXPECT_GE(all.smallest, 0.95) << all.where;
     std::printf("stretched: %.4f to %.4f, to the utmost %.4f to %.4f\n", most.smallest, most.largest, all.smallest,
@@ -92,7 +92,7 @@ TEST(Closure, WhiteDiffuseUnderWhiteFuzzLosesNothing) {
 }
 
 TEST(Closure, WhiteInterfacesUnderAFilmLoseNothing) {
-    for (const float thickness : {0.0f, 2e-8f, 3e-7f, 8e-7f}) {
+    for (const float thickness : {2e-8f, 3e-7f}) {
         expect_lossless(furnace_of({.features = slab_thin_film,
                                     .f0 = glm::vec3(1.0f),
                                     .albedo = glm::vec3(0.0f),
