@@ -90,8 +90,8 @@ struct Bins {
         const bool is_at_surface = lowest < 0.1 && highest > 0.0 && highest - lowest > 0.02 * highest;
         const double coarse = sum(2), fine = sum(4);
         const bool is_fine_enough =
-            std::abs(coarse - fine) < (is_full_test() ? 2e-5 * fine + 1e-12 : 2e-3 * fine + 1e-8);
-        if (depth == 0 || (!(is_at_surface && depth > (is_full_test() ? 7 : 5)) && is_fine_enough))
+            std::abs(coarse - fine) < (is_full_test() ? 2e-5 * fine + 1e-12 : 1e-3 * fine + 1e-9);
+        if (depth == 0 || (!(is_at_surface && depth > (is_full_test() ? 7 : 6)) && is_fine_enough))
             return fine + (fine - coarse) / 3.0;
         double result = 0.0;
         for (int i = 0; i < 2; ++i)
@@ -114,7 +114,7 @@ double smallest_probability(Library& library, const Library::Closure& closure, d
     for (int ring = 0; ring < bins.rings; ++ring)
         for (int sector = 0; sector < bins.sectors; ++sector)
             total += expected[ring * bins.sectors + sector] =
-                samples * std::max(bins.integral(density, ring, sector, 1.0, 1.0, is_full_test() ? 13 : 8), 0.0);
+                samples * std::max(bins.integral(density, ring, sector, 1.0, 1.0, is_full_test() ? 13 : 10), 0.0);
     Random random(seed);
     double kept = 0.0;
     for (long i = 0; i < samples; ++i) {
