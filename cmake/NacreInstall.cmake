@@ -24,7 +24,12 @@ set(public_headers
   rhi/format.h rhi/handle.h
   rhi/pipeline.h rhi/pipeline_reloader.h rhi/reflection.h rhi/resources.h rhi/shader_compiler.h rhi/texture_table.h
   rhi/trace.h rhi/validation.h
-  materials/description.h materials/single_slab.h
+  materials/description.h materials/single_slab.h materials/slab.h materials/closures/library.h materials/closures/lobes.h
+  materials/closures/classic.glsl materials/closures/closure.glsl materials/closures/diffuse.glsl
+  materials/closures/features.glsl materials/closures/fresnel.glsl materials/closures/fuzz.glsl
+  materials/closures/ggx.glsl materials/closures/glints.glsl materials/closures/haze.glsl materials/closures/math.glsl
+  materials/closures/medium.glsl materials/closures/slab.glsl materials/closures/tables.glsl
+  materials/closures/thin_film.glsl
   scene/builtin.h scene/environment.h scene/load.h scene/scene.h scene/shapes.h scene/tangents.h
   passes/frame_graph.h passes/gbuffer_layout.h passes/plan.h passes/profiles.h passes/renderer.h
   measure/comparison_page.h measure/cross_backend.h measure/flip.h measure/frame_times.h measure/image_metrics.h

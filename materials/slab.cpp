@@ -45,7 +45,7 @@ std::span<const SlabFeature> slab_features() { return features; }
 Slab clamped(const Slab& slab) {
     const Slab fallback;
     Slab result = slab;
-    const auto unit = [&](auto Slab::* field) { result.*field = in_range(slab.*field, 0.0f, 1.0f, fallback.*field); };
+    const auto unit = [&](auto Slab::*field) { result.*field = in_range(slab.*field, 0.0f, 1.0f, fallback.*field); };
     unit(&Slab::coverage);
     unit(&Slab::f0);
     unit(&Slab::roughness);
@@ -63,7 +63,7 @@ Slab clamped(const Slab& slab) {
     result.film_ior = in_range(slab.film_ior, 1.0f, 10.0f, fallback.film_ior);
     result.glint_density = in_range(slab.glint_density, 1e-6f, 1e18f, fallback.glint_density);
     for (int axis = 0; axis < 2; ++axis) {
-        const auto finite = [&](glm::vec2 Slab::* field) {
+        const auto finite = [&](glm::vec2 Slab::*field) {
             (result.*field)[axis] = in_range((slab.*field)[axis], -1e6f, 1e6f, 0.0f);
         };
         finite(&Slab::glint_position);
@@ -71,7 +71,8 @@ Slab clamped(const Slab& slab) {
         finite(&Slab::glint_dy);
     }
     for (int channel = 0; channel < 3; ++channel)
-        result.mean_free_path[channel] = length_in_range(slab.mean_free_path[channel], fallback.mean_free_path[channel]);
+        result.mean_free_path[channel] =
+            length_in_range(slab.mean_free_path[channel], fallback.mean_free_path[channel]);
     result.phase_anisotropy = in_range(slab.phase_anisotropy, -0.999f, 0.999f, fallback.phase_anisotropy);
     result.thickness = length_in_range(slab.thickness, fallback.thickness);
     result.emission = in_range(slab.emission, 0.0f, largest_radiance, fallback.emission);

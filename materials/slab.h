@@ -33,23 +33,24 @@ struct Slab {
     /// Share of the surface where this matter is, [0, 1]. Not its transparency: that is the medium's transmittance.
     float coverage = 1.0f;
 
-    /// Reflectance of the interface at normal incidence, [0, 1]. Below 0.02 (no matter reflects less, unless its index is
-    /// near that of its surroundings) the grazing reflectance fades too, so that 0 is no interface at all.
+    /// Reflectance of the interface at normal incidence, [0, 1]. Below 0.02 (no matter reflects less, unless its index
+    /// is near that of its surroundings) the grazing reflectance fades too, so that 0 is no interface at all.
     glm::vec3 f0{0.04f};
-    /// Perceptual, [0, 1]: GGX alpha is its square. Below 0.01 the lobe is a mirror. Also shapes the diffuse reflection.
+    /// Perceptual, [0, 1]: GGX alpha is its square. Below 0.01 the lobe is a mirror. Also shapes the diffuse
+    /// reflection.
     float roughness = 0.5f;
     /// Reflectance of the medium after all its scattering, at any angle, as if it were infinitely thick: [0, 1].
     glm::vec3 albedo{1.0f};
 
-    /// slab_anisotropy. [-1, 1]; alpha is roughness^2 (1 + anisotropy) along the tangent and roughness^2 (1 - anisotropy)
-    /// along the bitangent (Kulla and Conty 2017).
+    /// slab_anisotropy. [-1, 1]; alpha is roughness^2 (1 + anisotropy) along the tangent and roughness^2 (1 -
+    /// anisotropy) along the bitangent (Kulla and Conty 2017).
     float anisotropy = 0.0f;
 
     /// slab_f90. Color of the reflection at grazing incidence, [0, 1]. Only its color counts: it is scaled until its
     /// largest channel is 1, so that it never takes energy away. Black counts as white.
     glm::vec3 f90{1.0f};
-    /// slab_f82. Reflectance at 82 degrees relative to what Schlick's formula gives there, [0, 1]; 1 changes nothing. Below
-    /// 0.01, and where the reflectance would turn negative at some angle (on dark interfaces), it is limited.
+    /// slab_f82. Reflectance at 82 degrees relative to what Schlick's formula gives there, [0, 1]; 1 changes nothing.
+    /// Below 0.01, and where the reflectance would turn negative at some angle (on dark interfaces), it is limited.
     glm::vec3 f82{1.0f};
 
     /// slab_second_lobe. Perceptual roughness of a second GGX lobe with the same reflectance, [0, 1].
@@ -70,7 +71,8 @@ struct Slab {
     /// slab_thin_film. Index of refraction of the film, >= 1.
     float film_ior = 1.4f;
 
-    /// slab_specular_lut. Which of the tints by view and light angle that the renderer holds multiplies the specular lobes.
+    /// slab_specular_lut. Which of the tints by view and light angle that the renderer holds multiplies the specular
+    /// lobes.
     std::uint32_t specular_lut = 0;
 
     /// slab_glints. Microfacets per unit square of `glint_position`, > 0; infinitely many are the smooth lobe.
@@ -80,8 +82,8 @@ struct Slab {
     glm::vec2 glint_dx{0.0f};  ///< slab_glints. Change of `glint_position` to the next pixel in x.
     glm::vec2 glint_dy{0.0f};  ///< slab_glints. Change of `glint_position` to the next pixel in y.
 
-    /// slab_medium. Meters that light travels between two events (scattering or absorption), per channel; any value >= 0,
-    /// 0 is opaque and infinity is empty. The scale input of an authored mean free path is multiplied in.
+    /// slab_medium. Meters that light travels between two events (scattering or absorption), per channel; any value >=
+    /// 0, 0 is opaque and infinity is empty. The scale input of an authored mean free path is multiplied in.
     glm::vec3 mean_free_path{0.0f};
     /// slab_medium. Mean cosine of the scattering angle, (-1, 1): 0 isotropic, > 0 forward.
     float phase_anisotropy = 0.0f;

@@ -16,7 +16,7 @@ class Printer {
     TreeShader run() {
         print("// {}\n", shape(tree_.visible_tree.root));
         for (const SlabFeature& feature : slab_features()) {
-            if ((topology_.features & feature.bit) != 0) print("#define {} 1\n", feature.macro);
+            if ((topology_.features & feature.bit) != 0) result_.defines += fmt::format("#define {} 1\n", feature.macro);
         }
         print("#include \"materials/closures/blending.glsl\"\n\n");
         print("const uint tree_closure_count = {}u;\nconst uint tree_frame_count = {}u;\n\n", topology_.closures.size(),

@@ -12,7 +12,7 @@
 ///
 ///     NACRE_TRY(const FlattenedTree flat, flatten(tree));
 ///     const TreeShader shader = tree_shader(flat);
-///     // #define NACRE_PARAMETERS ... , then shader.glsl in a shader that provides what the text asks for
+///     text = shader.defines + what_it_asks_for + shader.glsl + main_function;
 
 namespace nacre::materials {
 
@@ -22,7 +22,7 @@ struct TreeTexture {
     TextureInput input;
 };
 
-/// GLSL and what it reads. The text includes "materials/closures/..." (see embedded_files()) and expects before it
+/// GLSL and what it reads. `glsl` includes "materials/closures/..." (see embedded_files()) and expects before it
 ///
 ///     float tree_parameter(uint index);   // parameters[index]
 ///     vec4 tree_texture(uint index);      // textures[index], filtered as the includer wants
@@ -37,6 +37,7 @@ struct TreeTexture {
 ///
 /// where closures count as in Topology::closures and frames as in Topology::frames.
 struct TreeShader {
+    std::string defines;  ///< The features' macros (slab_features()); they stand before all else.
     std::string glsl;
     std::vector<float> parameters;
     std::vector<TreeTexture> textures;

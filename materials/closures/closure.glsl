@@ -9,6 +9,9 @@
 #ifdef NACRE_SLAB_FUZZ
 #include "materials/closures/fuzz.glsl"
 #endif
+#ifdef NACRE_SLAB_GLINTS
+#include "materials/closures/glints.glsl"
+#endif
 #ifdef NACRE_SLAB_MEDIUM
 #include "materials/closures/medium.glsl"
 #endif
@@ -17,27 +20,28 @@
 #endif
 // A slab seen from one direction: everything that depends on slab and view is computed once, lights follow.
 //
-// All vectors are unit and in the local frame: z is the normal, x the tangent, y the bitangent; they point away from the
-// surface. Light directions below the surface (z < 0) ask for what the medium scatters through. Values include the cosine to
-// the light. Angles down to 1e-7 rad above the surface are handled; a view below that is moved there.
+// All vectors are unit and in the local frame: z is the normal, x the tangent, y the bitangent; they point away from
+// the surface. Light directions below the surface (z < 0) ask for what the medium scatters through. Values include the
+// cosine to the light. Angles down to 1e-7 rad above the surface are handled; a view below that is moved there.
 //
 //     Closure prepare_closure(Slab slab, vec3 view, float footprint)
-//         footprint: meters that a pixel (or ray cone) covers on the surface; decides what the medium scatters within it
+//         footprint: meters that a pixel (or ray cone) covers on the surface; tells what the medium scatters within it
 //     ClosureValue evaluate_closure(Closure closure, vec3 light)
 //     ClosureSample sample_closure(Closure closure, vec3 random)      random: [0, 1)^3
 //     float closure_pdf(Closure closure, vec3 light)                  solid angle, of sample_closure without mirrors
-//     ClosureAlbedo closure_albedo(Closure closure)                   towards the view, under white light from everywhere
-//     vec3 closure_transmittance(Closure closure, float cos_theta)    straight through the medium, from an outer direction
-//     vec3 closure_throughput(Closure closure)                        view: through fuzz, interface and medium, to what is below
+//     ClosureAlbedo closure_albedo(Closure closure)                   to the view, under white light from everywhere
+//     vec3 closure_transmittance(Closure closure, float cos_theta)    straight through the medium, by outer direction
+//     vec3 closure_throughput(Closure closure)                        of the view: through fuzz, interface and medium
 //     float slab_coverage(Slab slab, float cos_theta)                 where a slab may have slab_edge_coverage
-//     vec3 internal_reflectance(Slab slab)                            of diffuse light that hits the interface from below
+//     vec3 internal_reflectance(Slab slab)                            K, of diffuse light from the medium's side
 //     vec3 bounce_factor(vec3 internal, vec3 base_albedo)             (1 - K) / (1 - E_b K)
 //
 // Who includes this provides the tables (materials/closures/tables.glsl, medium.glsl) and, where a slab may have
 // slab_specular_lut, vec3 specular_lut(uint index, vec2 at): the tint by the cosines of view and light to the normal.
 //
-// What is not reciprocal: compensation, fuzz, thin film and what the interface leaves to the medium are computed towards the view only.
-// Energy is kept exactly that way (up to the error of the tables), and nothing but the lobes is computed for each light.
+// What is not reciprocal: compensation, fuzz, thin film and what the interface leaves to the medium are computed
+// towards the view only. Energy is kept exactly that way (up to the error of the tables), and nothing but the lobes is
+// computed for each light.
 
 struct ClosureValue {
     vec3 specular;    // interface and fuzz
@@ -63,9 +67,9 @@ struct ClosureAlbedo {
 struct SpecularLobe {
     vec2 alpha;
     float view_length;
-    vec3 scale;      // on single scattering: compensation for multiple scattering, share of the lobe, what fuzz lets through
-    vec3 albedo;     // scale included
-    vec3 passed;     // 1 - albedo of the lobe alone, with all its digits
+    vec3 scale;   // on single scattering: compensation for multiple, share of the lobe, what fuzz lets through
+    vec3 albedo;  // scale included
+    vec3 passed;  // 1 - albedo of the lobe alone, with all its digits
     bool is_mirror;
 };
 
@@ -92,10 +96,16 @@ struct Closure {
     float reflectance;  // of the interface at normal incidence, mean of the channels: tells how directions refract
     float transmission_probability;
 #endif
+#ifdef NACRE_SLAB_GLINTS
+    float glint_density;
+    vec2 glint_position;
+    vec2 glint_dx;
+    vec2 glint_dy;
+#endif
 #ifdef NACRE_SLAB_SPECULAR_LUT
     uint specular_lut;
 #endif
-    float gloss;
+    float gloss;          // of the diffuse model
     vec3 diffuse;         // albedo of what leaves where it entered
     float diffuse_scale;  // one over the albedo of the diffuse lobe as it is
     float specular_probability;
@@ -141,6 +151,25 @@ vec3 specular_tint(uint index, float view_cosine, float light_cosine) {
 }
 #endif
 
+// The model of the opaque medium: 0 Chan over its albedo, 1 Lambert, 2 renormalized Disney as published. A shader's
+// choice of cost against error.
+#ifndef NACRE_DIFFUSE_MODEL
+#define NACRE_DIFFUSE_MODEL 0
+#endif
+#if NACRE_DIFFUSE_MODEL == 2
+#include "materials/closures/classic.glsl"
+#endif
+
+float diffuse_lobe(Closure closure, vec3 light) {
+#if NACRE_DIFFUSE_MODEL == 0
+    return closure.diffuse_scale * chan_diffuse(closure.view, light, closure.gloss);
+#elif NACRE_DIFFUSE_MODEL == 1
+    return lambert_diffuse(light);
+#else
+    return disney_diffuse(closure.view, light, closure.gloss);
+#endif
+}
+
 // Of the interface without a film.
 Fresnel slab_fresnel(Slab slab) {
     vec3 f90 = vec3(1.0);
@@ -171,6 +200,12 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 #endif
     closure.specular = make_specular_lobe(closure.fresnel, closure.view, slab.roughness, anisotropy);
     vec3 passed = closure.specular.passed;
+#ifdef NACRE_SLAB_GLINTS
+    closure.glint_density = slab.glint_density;
+    closure.glint_position = slab.glint_position;
+    closure.glint_dx = slab.glint_dx;
+    closure.glint_dy = slab.glint_dy;
+#endif
 #ifdef NACRE_SLAB_SECOND_LOBE
     closure.second_probability = 0.0;
     if ((slab.features & slab_second_lobe) != 0u) {
@@ -201,10 +236,15 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 #endif
     }
 #endif
+#if NACRE_DIFFUSE_MODEL == 0
     closure.gloss = chan_gloss(slab.roughness);
+    closure.diffuse_scale = 1.0 / chan_albedo_by_table(min(closure.view.z, 1.0), closure.gloss);
+#else
+    closure.gloss = slab.roughness;
+    closure.diffuse_scale = 1.0;
+#endif
     vec3 entering = passed * uncovered;
     closure.diffuse = slab.albedo * entering;
-    closure.diffuse_scale = 1.0 / chan_albedo_by_table(min(closure.view.z, 1.0), closure.gloss);
 #ifdef NACRE_SLAB_SPECULAR_LUT
     closure.specular_lut = slab.specular_lut;
     if ((slab.features & slab_specular_lut) != 0u) {
@@ -290,8 +330,15 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
     if (light.z <= 0.0) return value;
     vec3 h = half_vector(closure.view, light);
     vec3 lobes = specular_lobe_value(closure.specular, closure.view, light, h);
+#ifdef NACRE_SLAB_GLINTS
+    // The second lobe stays smooth: it is the haze around the facets.
+    if ((closure.features & slab_glints) != 0u && !closure.specular.is_mirror)
+        lobes *= glint_factor(h, closure.specular.alpha, closure.glint_density, closure.glint_position,
+                              closure.glint_dx, closure.glint_dy);
+#endif
 #ifdef NACRE_SLAB_SECOND_LOBE
-    if ((closure.features & slab_second_lobe) != 0u) lobes += specular_lobe_value(closure.second, closure.view, light, h);
+    if ((closure.features & slab_second_lobe) != 0u)
+        lobes += specular_lobe_value(closure.second, closure.view, light, h);
 #endif
     value.specular = lobes * fresnel_reflectance(closure.fresnel, half_vector_cosine(closure.view, light));
 #ifdef NACRE_SLAB_SPECULAR_LUT
@@ -301,7 +348,7 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
 #ifdef NACRE_SLAB_FUZZ
     if ((closure.features & slab_fuzz) != 0u) value.specular += closure.fuzz * sheen_density(closure.fuzz_map, light);
 #endif
-    value.diffuse = closure.diffuse * (closure.diffuse_scale * chan_diffuse(closure.view, light, closure.gloss));
+    value.diffuse = closure.diffuse * diffuse_lobe(closure, light);
 #ifdef NACRE_SLAB_MEDIUM
     if ((closure.features & slab_medium) != 0u) {
         value.diffuse += closure.thin * (light.z / pi);
@@ -441,8 +488,8 @@ float slab_coverage(Slab slab, float cos_theta) {
 }
 #endif
 
-// Of diffuse light that hits the interface from the medium's side: what leaves through a denser medium's surface is what enters
-// it, spread over index^2 times the angle.
+// Of diffuse light that hits the interface from the medium's side: what leaves through a denser medium's surface is
+// what enters it, spread over index^2 times the angle.
 float internal_reflectance_of(float f0, float mean) { return 1.0 - (1.0 - mean) / square(reflectance_to_ior(f0)); }
 
 vec3 internal_reflectance(Slab slab) {
@@ -452,8 +499,8 @@ vec3 internal_reflectance(Slab slab) {
                 internal_reflectance_of(slab.f0.z, mean.z));
 }
 
-// What a diffuse base of albedo base_albedo under an interface sends out, relative to its first bounce: the light that the
-// interface throws back hits the base again, and again. Source: OpenPBR, "Coat darkening".
+// What a diffuse base of albedo base_albedo under an interface sends out, relative to its first bounce: the light that
+// the interface throws back hits the base again, and again. Source: OpenPBR, "Coat darkening".
 vec3 bounce_factor(vec3 internal, vec3 base_albedo) {
     vec3 passed = vec3(1.0) - internal;
     // Written so that nothing is lost where both are 1.

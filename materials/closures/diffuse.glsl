@@ -7,10 +7,11 @@
 
 float lambert_diffuse(vec3 light) { return max(light.z, 0.0) / pi; }
 
-// Retro-reflective diffuse under a rough interface. Source: Chan 2018, "Material advances in Call of Duty: WWII". `gloss` is that
-// game's, 2^(18 gloss) = 2 / alpha^2 - 1: the logarithm in the published .18455 log(...) is that of base 10. As published the
-// model is a fit that does not keep energy (its albedo towards grazing views is 0.54 on smooth and above 1 on rough surfaces):
-// who uses it divides by its directional albedo. Where the fit's retro-reflection turns negative (gloss above 0.71) it is 0 here.
+// Retro-reflective diffuse under a rough interface. Source: Chan 2018, "Material advances in Call of Duty: WWII".
+// `gloss` is that game's, 2^(18 gloss) = 2 / alpha^2 - 1: the logarithm in the published .18455 log(...) is that of
+// base 10. As published the model is a fit that does not keep energy (its albedo towards grazing views is 0.54 on
+// smooth and above 1 on rough surfaces): who uses it divides by its directional albedo. Where the fit's
+// retro-reflection turns negative (gloss above 0.71) it is 0 here.
 float chan_gloss(float roughness) {
     float alpha = roughness * roughness;
     return saturated(log2(2.0 / max(alpha * alpha, 1e-7) - 1.0) / 18.0);
@@ -33,12 +34,13 @@ float chan_diffuse(vec3 view, vec3 light, float gloss) {
     float half_cosine = half_vector_cosine(view, light);
     float rough = half_cosine + power5(1.0 - half_cosine);
     float glossy = (1.0 - 0.75 * power5(1.0 - min(light.z, 1.0))) * (1.0 - 0.75 * power5(1.0 - min(view.z, 1.0)));
-    float retro = chan_retro_amplitude(gloss) * chan_retro(half_cosine, half_vector(view, light).z, chan_sharpness(gloss));
+    float retro =
+        chan_retro_amplitude(gloss) * chan_retro(half_cosine, half_vector(view, light).z, chan_sharpness(gloss));
     return (mix(rough, glossy, chan_glossiness(gloss)) + retro) * light.z / pi;
 }
 
-// What chan_diffuse reflects in all: retro_albedo is that of chan_retro. The glossy part is a closed form, the rough part a
-// fit of its integral that is off by less than 1e-4.
+// What chan_diffuse reflects in all: retro_albedo is that of chan_retro. The glossy part is a closed form, the rough
+// part a fit of its integral that is off by less than 1e-4.
 float chan_albedo(float view_cosine, float gloss, float retro_albedo) {
     float rough = 0.70712 + view_cosine * (0.18899 + view_cosine * (0.03262 + view_cosine * -0.01830));
     float glossy = (27.0 / 28.0) * (1.0 - 0.75 * power5(1.0 - view_cosine));

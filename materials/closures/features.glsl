@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef NACRE_CLOSURES_FEATURES
 #define NACRE_CLOSURES_FEATURES
-// What a slab may have beyond one GGX lobe with F0 over an opaque diffuse medium: bits of Slab::features. A shader in which a
-// feature occurs defines its macro as well (materials/slab.h lists them); without the macro its code and its fields do not
-// exist. Where a slab's features are written as a constant, the code of those it lacks folds away.
+// What a slab may have beyond one GGX lobe with F0 over an opaque diffuse medium: bits of Slab::features. A shader in
+// which a feature occurs defines its macro as well (materials/slab.h lists them); without the macro its code and its
+// fields do not exist. Where a slab's features are written as a constant, the code of those it lacks folds away.
 const uint slab_anisotropy = 1u;        // NACRE_SLAB_ANISOTROPY
 const uint slab_f90 = 2u;               // NACRE_SLAB_F90
 const uint slab_f82 = 4u;               // NACRE_SLAB_F82

@@ -3,16 +3,16 @@
 #define NACRE_CLOSURES_FRESNEL
 #include "materials/closures/math.glsl"
 
-// Reflectance of an interface by angle: at + (grazing - at) (1 - c)^5 - dip c (1 - c)^6, c the cosine to the (micro)normal.
-// Sources: Schlick 1994; the dip at 82 degrees: Hoffman 2019, "Fresnel equations considered harmful".
+// Reflectance of an interface by angle: at + (grazing - at) (1 - c)^5 - dip c (1 - c)^6, c the cosine to the
+// (micro)normal. Sources: Schlick 1994; the dip at 82 degrees: Hoffman 2019, "Fresnel equations considered harmful".
 struct Fresnel {
     vec3 normal;   // reflectance at normal incidence
     vec3 grazing;  // largest channel 1, or less where `normal` is below that of any matter
     vec3 dip;
 };
 
-// Below this reflectance (that of ice) the grazing reflectance fades: an interface between equal indices reflects nothing at any
-// angle, which Schlick's formula misses.
+// Below this reflectance (that of ice) the grazing reflectance fades: an interface between equal indices reflects
+// nothing at any angle, which Schlick's formula misses.
 const float smallest_reflectance = 0.02;
 
 Fresnel make_fresnel(vec3 f0, vec3 f90, vec3 f82) {
@@ -23,10 +23,11 @@ Fresnel make_fresnel(vec3 f0, vec3 f90, vec3 f82) {
     fresnel.grazing = tint * saturated(largest(f0) / smallest_reflectance);
     vec3 rise = fresnel.grazing - f0;
     // (6/7)^5 and 1 / ((1/7) (6/7)^6): the two terms where the dip is largest, at c = 1/7. The bound keeps the sum from
-    // falling below 0 anywhere: 1 / (c (1 - c)^6) is at least 17.65, 1 / (c (1 - c)) at least 4. A hundredth is always left:
-    // 32 bits cannot tell what is less.
+    // falling below 0 anywhere: 1 / (c (1 - c)^6) is at least 17.65, 1 / (c (1 - c)) at least 4. A hundredth is always
+    // left: 32 bits cannot tell what is less.
     fresnel.dip = min((f0 + rise * 0.462664366) * min(vec3(1.0) - f82, vec3(0.99)),
-                      0.99 * (min(f0, fresnel.grazing) + abs(rise) * 0.226611)) * 17.6513846;
+                      0.99 * (min(f0, fresnel.grazing) + abs(rise) * 0.226611)) *
+                  17.6513846;
     return fresnel;
 }
 
@@ -45,7 +46,8 @@ vec3 fresnel_transmittance(Fresnel fresnel, float cos_theta) {
     float c = saturated(cos_theta);
     float m = 1.0 - c;
     float m5 = power5(m);
-    return (vec3(1.0) - fresnel.normal) * schlick_rest(c, m) + (vec3(1.0) - fresnel.grazing) * m5 + fresnel.dip * (c * m5 * m);
+    return (vec3(1.0) - fresnel.normal) * schlick_rest(c, m) + (vec3(1.0) - fresnel.grazing) * m5 +
+           fresnel.dip * (c * m5 * m);
 }
 
 // Mean over a hemisphere under diffuse light: integral of 2 c F(c).
@@ -58,8 +60,8 @@ vec3 fresnel_mean_transmittance(Fresnel fresnel) {
     return (vec3(1.0) - fresnel.normal) * (20.0 / 21.0) + (vec3(1.0) - fresnel.grazing) / 21.0 + fresnel.dip / 126.0;
 }
 
-// Index of refraction of a dielectric by its reflectance at normal incidence, and back. An index above 199 (reflectance 0.98)
-// stands for all that is opaque.
+// Index of refraction of a dielectric by its reflectance at normal incidence, and back. An index above 199 (reflectance
+// 0.98) stands for all that is opaque.
 float reflectance_to_ior(float f0) {
     float root = sqrt(clamp(f0, 0.0, 0.98));
     return (1.0 + root) / (1.0 - root);
@@ -67,8 +69,8 @@ float reflectance_to_ior(float f0) {
 
 float ior_to_reflectance(float ior) { return square((ior - 1.0) / (ior + 1.0)); }
 
-// Cosine of the direction inside a denser medium, by its reflectance at normal incidence. Every term is positive: sin^2 / ior^2
-// subtracted from 1 would lose the digits of grazing directions where the medium is hardly denser.
+// Cosine of the direction inside a denser medium, by its reflectance at normal incidence. Every term is positive: sin^2
+// / ior^2 subtracted from 1 would lose the digits of grazing directions where the medium is hardly denser.
 float refracted_cosine(float cos_theta, float f0) {
     float root = sqrt(clamp(f0, 0.0, 0.98));
     return sqrt(4.0 * root + square(cos_theta * (1.0 - root))) / (1.0 + root);

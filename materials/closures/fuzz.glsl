@@ -3,10 +3,11 @@
 #define NACRE_CLOSURES_FUZZ
 #include "materials/closures/math.glsl"
 
-// Fibers that stand on the interface: a cosine lobe under a linear map, times its directional albedo. Multiple scattering
-// between the fibers is in it; it samples without noise; it is not reciprocal (the map depends on the view).
-// Source: Zeltner, Burley and Chiang 2022, "Practical multiple-scattering sheen using linearly transformed cosines"; the
-// closed forms of its tables are those of the OpenPBR and MaterialX specifications (Apache-2.0), fitted to its volumetric data.
+// Fibers that stand on the interface: a cosine lobe under a linear map, times its directional albedo. Multiple
+// scattering between the fibers is in it; it samples without noise; it is not reciprocal (the map depends on the view).
+// Source: Zeltner, Burley and Chiang 2022, "Practical multiple-scattering sheen using linearly transformed cosines";
+// the closed forms of its tables are those of the OpenPBR and MaterialX specifications (Apache-2.0), fitted to its
+// volumetric data.
 
 // Directional albedo, at most 0.744.
 float sheen_albedo(float cos_theta, float roughness) {
@@ -33,7 +34,8 @@ SheenMap sheen_map(vec3 view, float roughness) {
     SheenMap map;
     map.axis = tangent_length > 1e-12 ? vec2(view.x, view.y) / tangent_length : vec2(1.0, 0.0);
     map.scale = max((2.58126 * x + 0.813703 * y) * y / (1.0 + 0.310327 * x * x + 2.60994 * x * y), 1e-6);
-    map.shear = sqrt(1.0 - x) * (y - 1.0) * y * y * y / (0.0000254053 + 1.71228 * x - 1.71506 * x * y + 1.34174 * y * y);
+    map.shear =
+        sqrt(1.0 - x) * (y - 1.0) * y * y * y / (0.0000254053 + 1.71228 * x - 1.71506 * x * y + 1.34174 * y * y);
     return map;
 }
 

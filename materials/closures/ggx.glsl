@@ -4,8 +4,8 @@
 #include "materials/closures/math.glsl"
 
 // One GGX lobe with height-correlated Smith shadowing, single scattering, without Fresnel. alpha: along x and along y.
-// Sources: Walter et al. 2007; Heitz 2014, "Understanding the masking-shadowing function"; Dupuy and Benyoub 2023, "Sampling
-// visible GGX normals with spherical caps".
+// Sources: Walter et al. 2007; Heitz 2014, "Understanding the masking-shadowing function"; Dupuy and Benyoub 2023,
+// "Sampling visible GGX normals with spherical caps".
 
 // Smoother lobes (and both axes of anisotropic ones) are mirrors: 32 bits cannot hold their peaks.
 const float smallest_alpha = 1e-4;
@@ -13,7 +13,8 @@ const float smallest_alpha = 1e-4;
 // Source: Kulla and Conty 2017, "Revisiting physically based shading at Imageworks".
 vec2 ggx_alpha(float roughness, float anisotropy) {
     float alpha = roughness * roughness;
-    return vec2(clamp(alpha * (1.0 + anisotropy), smallest_alpha, 1.0), clamp(alpha * (1.0 - anisotropy), smallest_alpha, 1.0));
+    return vec2(clamp(alpha * (1.0 + anisotropy), smallest_alpha, 1.0),
+                clamp(alpha * (1.0 - anisotropy), smallest_alpha, 1.0));
 }
 
 bool ggx_is_mirror(float roughness) { return roughness * roughness < smallest_alpha; }
@@ -23,7 +24,8 @@ float ggx_stretched_length(vec3 direction, vec2 alpha) {
     return length(vec3(alpha.x * direction.x, alpha.y * direction.y, direction.z));
 }
 
-// Density of microfacet normals. No digits cancel here; 1 - cos^2 would lose all of them for smooth surfaces in 32 bits.
+// Density of microfacet normals. No digits cancel here; 1 - cos^2 would lose all of them for smooth surfaces in 32
+// bits.
 float ggx_distribution(vec3 h, vec2 alpha) {
     float area = alpha.x * alpha.y;
     vec3 stretched = vec3(alpha.y * h.x, alpha.x * h.y, area * h.z);
@@ -31,7 +33,8 @@ float ggx_distribution(vec3 h, vec2 alpha) {
     return area * ratio * ratio / pi;
 }
 
-// Value times the cosine of light: D G / (4 view.z). view_length: ggx_stretched_length of view; h: half_vector(view, light).
+// Value times the cosine of light: D G / (4 view.z). view_length: ggx_stretched_length of view; h: half_vector(view,
+// light).
 float ggx_value(vec3 view, float view_length, vec3 light, vec3 h, vec2 alpha) {
     if (light.z <= 0.0) return 0.0;
     float light_length = ggx_stretched_length(light, alpha);

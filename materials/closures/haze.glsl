@@ -12,9 +12,9 @@ struct Haze {
     float second_weight;
 };
 
-// f0: of the lobe without haze; roughness: of its core, perceptual; haziness: [0, 1]; extent: how much wider the haze is than the
-// core, >= 0 (the second lobe's alpha is that of the core times 1 + extent). The peak of the core does not move with haziness: the
-// reflectance rises by what the haze adds around it.
+// f0: of the lobe without haze; roughness: of its core, perceptual; haziness: [0, 1]; extent: how much wider the haze
+// is than the core, >= 0 (the second lobe's alpha is that of the core times 1 + extent). The peak of the core does not
+// move with haziness: the reflectance rises by what the haze adds around it.
 Haze make_haze(float f0, float roughness, float haziness, float extent) {
     float widening = 1.0 + max(extent, 0.0);
     float alpha = min(roughness * roughness * widening, 1.0);

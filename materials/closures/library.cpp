@@ -60,7 +60,8 @@ Lobes::vec2 Library::medium_table(vec3 at) {
         const glm::ivec3 offset(corner & 1, corner >> 1 & 1, corner >> 2), index = glm::ivec3(entry) + offset;
         const double weight = (offset.x ? part.x : 1.0 - part.x) * (offset.y ? part.y : 1.0 - part.y) *
                               (offset.z ? part.z : 1.0 - part.z);
-        const std::uint16_t* word = &words[2 * static_cast<std::size_t>((index.z * rows + index.y) * columns + index.x)];
+        const std::uint16_t* word =
+            &words[2 * static_cast<std::size_t>((index.z * rows + index.y) * columns + index.x)];
         sum += weight * vec2(word[0], word[1]) / 65535.0;
     }
     return sum;

@@ -7,8 +7,8 @@
 #include "materials/slab.h"  // has the features that the text below asks for
 
 /// @file
-/// The closures of materials/closures/closure.glsl as C++ in double precision, from the same text and with the same tables: the
-/// reference for what devices compute, and what tools shade with.
+/// The closures of materials/closures/closure.glsl as C++ in double precision, from the same text and with the same
+/// tables: the reference for what devices compute, and what tools shade with.
 ///
 ///     closures::Library library;
 ///     auto closure = library.prepare_closure(closures::Library::slab_of(gold), view, 1e-3);

@@ -13,8 +13,8 @@
 #include "materials/slab.h"  // first: its features.glsl is the one that counts
 
 /// @file
-/// The lobes of materials/closures/*.glsl as C++ in double precision, from the same text: the reference for what devices
-/// compute. The functions are members so that the text needs no storage classes; an object has no state.
+/// The lobes of materials/closures/*.glsl as C++ in double precision, from the same text: the reference for what
+/// devices compute. The functions are members so that the text needs no storage classes; an object has no state.
 ///
 ///     closures::Lobes lobes;
 ///     double peak = lobes.ggx_distribution({0.0, 0.0, 1.0}, {0.1, 0.1});
@@ -34,12 +34,14 @@ struct Lobes {
 // In these files every `const` is a constant outside of functions.
 #define float double
 #define const static constexpr
-#include "materials/closures/math.glsl"
-#include "materials/closures/fresnel.glsl"
-#include "materials/closures/ggx.glsl"
+#include "materials/closures/classic.glsl"
 #include "materials/closures/diffuse.glsl"
+#include "materials/closures/fresnel.glsl"
 #include "materials/closures/fuzz.glsl"
+#include "materials/closures/ggx.glsl"
+#include "materials/closures/glints.glsl"
 #include "materials/closures/haze.glsl"
+#include "materials/closures/math.glsl"
 #include "materials/closures/thin_film.glsl"
 #undef const
 #undef float

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef NACRE_CLOSURES_MATH
 #define NACRE_CLOSURES_MATH
-// The files of this folder are GLSL and C++ at once (materials/closures/library.h compiles them in double precision): no
-// swizzles beyond .x .y .z .w, no out parameters, no constructors of structs and arrays, no textures.
+// The files of this folder are GLSL and C++ at once (materials/closures/library.h compiles them in double precision):
+// no swizzles beyond .x .y .z .w, no out parameters, no constructors of structs and arrays, no textures.
 
 const float pi = 3.14159265358979323846;
 

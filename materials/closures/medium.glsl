@@ -4,16 +4,15 @@
 #include "materials/closures/math.glsl"
 // A layer of a scattering and absorbing medium between two planes, from opaque to empty. Who includes this has defined
 //
-//     vec2 medium_table(vec3 at)    materials/tables/medium_table.h, trilinear, (0, 0, 0) and (1, 1, 1) being the first and the
-//                                   last entry
+//     vec2 medium_table(vec3 at)    materials/tables/medium_table.h, interpolated as those of tables.glsl
 
 // Lengths that are divided stay between these: meters.
 const float shortest_length = 1e-12;
 const float longest_length = 1e12;
 
-// The similarity parameter sqrt((1 - w) / (1 - w g)), w being the albedo of a single scattering and g the phase anisotropy, of
-// a medium that reflects `albedo` if it is infinitely thick, and back. 0: nothing is absorbed, 1: nothing is scattered.
-// Source: van de Hulst 1980, in the form of Kulla and Conty 2017; round trip within 2e-5.
+// The similarity parameter sqrt((1 - w) / (1 - w g)), w being the albedo of a single scattering and g the phase
+// anisotropy, of a medium that reflects `albedo` if it is infinitely thick, and back. 0: nothing is absorbed, 1:
+// nothing is scattered. Source: van de Hulst 1980, in the form of Kulla and Conty 2017; round trip within 2e-5.
 float medium_similarity(float albedo) {
     float root = sqrt(9.59217 + albedo * (41.6808 + albedo * 17.7126));
     // 4.09712 + 4.20863 albedo - root, multiplied out so that the ends are exact and no digits cancel.
@@ -47,7 +46,9 @@ float optical_depth(float mean_free_path, float distance) {
     return clamp(distance, 0.0, longest_length) / clamp(mean_free_path, shortest_length, longest_length);
 }
 
-float medium_transmittance(float mean_free_path, float distance) { return exp(-optical_depth(mean_free_path, distance)); }
+float medium_transmittance(float mean_free_path, float distance) {
+    return exp(-optical_depth(mean_free_path, distance));
+}
 
 // 1 - exp(-x), with all digits where x is small.
 float interacting(float x) { return x < 0.01 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x); }
@@ -63,8 +64,8 @@ struct Scattering {
 // Rows of the table: optical depths 2^-8 to 2^12.
 float medium_table_row(float depth) { return saturated((log2(clamp(depth, 1e-6, 1e6)) + 8.0) / 20.0); }
 
-// cosine: inside the medium. Directions of scattering are not told apart: a phase function g counts as the isotropic one whose
-// depth is scaled by 1 - w g (van de Hulst's similarity). Nothing is lost where nothing is absorbed.
+// cosine: inside the medium. Directions of scattering are not told apart: a phase function g counts as the isotropic
+// one whose depth is scaled by 1 - w g (van de Hulst's similarity). Nothing is lost where nothing is absorbed.
 Scattering medium_scattering(float albedo, float depth, float phase_anisotropy, float cosine) {
     Scattering result;
     float similarity = medium_similarity(albedo);
@@ -85,8 +86,8 @@ Scattering medium_scattering(float albedo, float depth, float phase_anisotropy, 
     // An infinitely thick medium reflects its albedo towards every angle, as an opaque one does.
     float toward_albedo = mix(1.0, albedo / max(single * infinite.y, 1e-30), result.opaque);
     result.reflected = min(escaping * back * (similarity > 0.0 ? toward_albedo : 1.0), 1.0);
-    // Of the light that the isotropic medium lets through straight, this one scatters some forward; a backward phase function
-    // takes some of it.
+    // Of the light that the isotropic medium lets through straight, this one scatters some forward; a backward phase
+    // function takes some of it.
     float inside = max(cosine, smallest_cosine);
     float forward = depth * phase_anisotropy * single * inverse / inside;
     result.straight = exp(-depth / inside);
@@ -98,10 +99,12 @@ Scattering medium_scattering(float albedo, float depth, float phase_anisotropy, 
 }
 
 // Share of the light that a medium scatters back which leaves farther from where it entered than half a footprint.
-// Source: Christensen and Burley 2015, "Approximate reflectance profiles for efficient subsurface scattering", diffuse light.
+// Source: Christensen and Burley 2015, "Approximate reflectance profiles for efficient subsurface scattering", diffuse
+// light.
 float subsurface_share(float albedo, float mean_free_path, float footprint) {
     float scale = 1.9 - albedo + 3.5 * (albedo - 0.8) * (albedo - 0.8);
-    float radius = 0.5 * scale * clamp(footprint, 0.0, longest_length) / clamp(mean_free_path, shortest_length, longest_length);
+    float radius =
+        0.5 * scale * clamp(footprint, 0.0, longest_length) / clamp(mean_free_path, shortest_length, longest_length);
     return 0.25 * exp(-radius) + 0.75 * exp(-radius / 3.0);
 }
 

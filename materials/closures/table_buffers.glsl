@@ -1,17 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef NACRE_CLOSURES_TABLE_BUFFERS
 #define NACRE_CLOSURES_TABLE_BUFFERS
-// The tables of the closures (materials/closures/tables.glsl) from storage buffers, interpolated in full precision. Who includes
-// this defines the set and the first of three bindings:
-//
-//     #define NACRE_TABLE_SET 0
-//     #define NACRE_TABLE_BINDING 2    interface_table(), medium_table(), anisotropy_table() of materials/tables/, as they are
-//
-// Sizes are those of the headers there, which tests/materials/closure_device_test.cpp holds against this.
-
-layout(set = NACRE_TABLE_SET, binding = NACRE_TABLE_BINDING, std430) readonly buffer InterfaceTable { uint interface_words[]; };
-layout(set = NACRE_TABLE_SET, binding = NACRE_TABLE_BINDING + 1, std430) readonly buffer MediumTable { uint medium_words[]; };
-layout(set = NACRE_TABLE_SET, binding = NACRE_TABLE_BINDING + 2, std430) readonly buffer AnisotropyTable { uint anisotropy_words[]; };
+// The tables that the closures ask for, out of buffers that hold their words as they are, two in each uint. Who
+// includes this has declared uint interface_words[] and, where slabs have the features, anisotropy_words[] and
+// medium_words[]. Reading them interpolated is the same on every device, which a texture's filter is not.
 
 vec4 interface_entry(int column, int row) {
     int at = 2 * (row * 64 + column);
@@ -26,6 +18,7 @@ vec4 interface_table(vec2 at) {
                mix(interface_entry(entry.x, entry.y + 1), interface_entry(entry.x + 1, entry.y + 1), part.x), part.y);
 }
 
+#ifdef NACRE_SLAB_MEDIUM
 vec2 medium_row(ivec3 at, vec3 part) {
     int word = (at.z * 41 + at.y) * 16 + at.x;
     return mix(unpackUnorm2x16(medium_words[word]), unpackUnorm2x16(medium_words[word + 1]), part.x);
@@ -41,7 +34,9 @@ vec2 medium_table(vec3 at) {
     vec3 part = place - vec3(entry);
     return mix(medium_slice(entry, part), medium_slice(ivec3(entry.x, entry.y, entry.z + 1), part), part.z);
 }
+#endif
 
+#ifdef NACRE_SLAB_ANISOTROPY
 vec2 anisotropy_table(vec4 at) {
     vec4 place = clamp(at, vec4(0.0), vec4(1.0)) * vec4(11.0, 9.0, 11.0, 10.0);
     ivec4 entry = min(ivec4(place), ivec4(10, 8, 10, 9));
@@ -56,5 +51,6 @@ vec2 anisotropy_table(vec4 at) {
     }
     return sum;
 }
+#endif
 
 #endif

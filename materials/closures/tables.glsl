@@ -5,9 +5,11 @@
 #include "materials/closures/ggx.glsl"
 // Directional albedos by table. Who includes this has defined
 //
-//     vec4 interface_table(vec2 at)     materials/tables/interface_table.h, bilinear, (0, 0) and (1, 1) being the first and the
-//                                       last entry: a texture's coordinate is (at * vec2(63, 95) + 0.5) / vec2(64, 96)
-//     vec2 anisotropy_table(vec4 at)    with slab_anisotropy: materials/tables/anisotropy_table.h, linear in all four
+//     vec4 interface_table(vec2 at)     materials/tables/interface_table.h
+//     vec2 anisotropy_table(vec4 at)    with slab_anisotropy: materials/tables/anisotropy_table.h
+//
+// which interpolate linearly along all axes; 0 is the first entry of an axis and 1 the last, so that a texture is read at
+// (at * (size - 1) + 0.5) / size. materials/closures/table_buffers.glsl has them for buffers.
 
 // What a GGX lobe with single scattering reflects towards a direction.
 struct GgxAlbedo {
@@ -43,8 +45,9 @@ GgxAlbedo stretched_ggx_albedo(vec3 view, vec2 alpha) {
     float cosine = min(view.z, 1.0);
     float ratio = smaller / larger;
     // Straight down every azimuth is the same.
-    vec2 entry = anisotropy_table(vec4(ggx_table_coordinate(cosine, seen),
-                                       atan(sqrt(sqrt(ratio)) * across, along) * (2.0 / pi), pow(ratio, 1.0 / 3.0), sqrt(larger)));
+    vec2 entry =
+        anisotropy_table(vec4(ggx_table_coordinate(cosine, seen), atan(sqrt(sqrt(ratio)) * across, along) * (2.0 / pi),
+                              pow(ratio, 1.0 / 3.0), sqrt(larger)));
     GgxAlbedo albedo = ggx_albedo(cosine, seen);
     albedo.missing = entry.x;
     albedo.schlick = clamp(albedo.schlick + (entry.y - 0.25) * 0.5, 0.0, 1.0);

@@ -3,12 +3,12 @@
 #define NACRE_CLOSURES_THIN_FILM
 #include "materials/closures/fresnel.glsl"
 
-// A film of some hundred nanometers on an interface: its two reflections interfere, differently for each wavelength. Integrated
-// over the spectrum in closed form by Gaussian fits of the color matching functions in the frequency domain.
+// A film of some hundred nanometers on an interface: its two reflections interfere, differently for each wavelength.
+// Integrated over the spectrum in closed form by Gaussian fits of the color matching functions in the frequency domain.
 // Source: Belcour and Barla 2017, "A practical extension to microfacet theory for the modeling of varying iridescence".
 
-// The film's color of the m-th order: share of cos(2 pi path / wavelength) that is left over the spectrum, as linear sRGB.
-// White light stays white without a path.
+// The film's color of the m-th order: share of cos(2 pi path / wavelength) that is left over the spectrum, as linear
+// sRGB. White light stays white without a path.
 vec3 film_interference(float path) {
     float phase = 2.0 * pi * path;
     float square_phase = phase * phase;
@@ -25,8 +25,8 @@ vec3 film_interference(float path) {
 // Below this the film fades: two orders of interference do not add up to the interface without it.
 const float thinnest_film = 3e-8;
 
-// 1 - reflectance, all orders of the incoherent sum and two of the interference: the series of Airy with both summed up. Nothing
-// cancels where the lower side reflects everything. `through` is 1 - outer.
+// 1 - reflectance, all orders of the incoherent sum and two of the interference: the series of Airy with both summed
+// up. Nothing cancels where the lower side reflects everything. `through` is 1 - outer.
 float film_channel(float outer, float through, float inner, float inner_rest, float first_order, float second_order) {
     float amplitude = sqrt(outer * inner);
     float passed = through * inner_rest / max(1.0 - outer * inner, 1e-6);
@@ -50,12 +50,12 @@ vec3 film_transmittance(vec3 f0, float thickness, float film_ior, float cos_thet
                       mix(reflectance_under(f0.y, ior), 1.0, saturated(f0.y * 50.0 - 49.0)),
                       mix(reflectance_under(f0.z, ior), 1.0, saturated(f0.z * 50.0 - 49.0)));
     vec3 rest = (vec3(1.0) - below) * inside_rest;
-    // A reflection off a denser medium turns the phase by half a wave, off the film's upper side and, where what is below is
-    // denser than the film, off its lower side: then both orders add up without a path.
-    vec3 film = vec3(
-        film_channel(outer, through, 1.0 - rest.x, rest.x, f0.x < outer_f0 ? order_1.x : -order_1.x, order_2.x),
-        film_channel(outer, through, 1.0 - rest.y, rest.y, f0.y < outer_f0 ? order_1.y : -order_1.y, order_2.y),
-        film_channel(outer, through, 1.0 - rest.z, rest.z, f0.z < outer_f0 ? order_1.z : -order_1.z, order_2.z));
+    // A reflection off a denser medium turns the phase by half a wave, off the film's upper side and, where what is
+    // below is denser than the film, off its lower side: then both orders add up without a path.
+    vec3 film =
+        vec3(film_channel(outer, through, 1.0 - rest.x, rest.x, f0.x < outer_f0 ? order_1.x : -order_1.x, order_2.x),
+             film_channel(outer, through, 1.0 - rest.y, rest.y, f0.y < outer_f0 ? order_1.y : -order_1.y, order_2.y),
+             film_channel(outer, through, 1.0 - rest.z, rest.z, f0.z < outer_f0 ? order_1.z : -order_1.z, order_2.z));
     return clamp(film, vec3(0.0), vec3(1.0));
 }
 
@@ -63,8 +63,8 @@ vec3 film_reflectance(vec3 f0, float thickness, float film_ior, float cos_theta)
     return vec3(1.0) - film_transmittance(f0, thickness, film_ior, cos_theta);
 }
 
-// The interface with its film as a Schlick curve that passes through the film's reflectance at one cosine: so the tables of
-// directional albedo hold for it.
+// The interface with its film as a Schlick curve that passes through the film's reflectance at one cosine: so the
+// tables of directional albedo hold for it.
 Fresnel make_film_fresnel(Fresnel bare, float thickness, float film_ior, float cos_theta) {
     // Along the surface all curves meet, and the fit would divide by nothing.
     float c = clamp(cos_theta, 0.1, 1.0);
@@ -72,7 +72,8 @@ Fresnel make_film_fresnel(Fresnel bare, float thickness, float film_ior, float c
     vec3 missing = film_transmittance(bare.normal, thickness, film_ior, c);
     Fresnel fresnel = bare;
     fresnel.grazing = max(bare.grazing, vec3(saturated(ior_to_reflectance(max(film_ior, 1.0)) / smallest_reflectance)));
-    vec3 normal = vec3(1.0) - clamp((missing - (vec3(1.0) - fresnel.grazing) * m5) / schlick_rest(c, 1.0 - c), vec3(0.0), vec3(1.0));
+    vec3 normal = vec3(1.0) - clamp((missing - (vec3(1.0) - fresnel.grazing) * m5) / schlick_rest(c, 1.0 - c),
+                                    vec3(0.0), vec3(1.0));
     float share = smoothstep(0.0, thinnest_film, thickness);
     fresnel.normal = mix(bare.normal, normal, share);
     fresnel.grazing = mix(bare.grazing, fresnel.grazing, share);

@@ -5,9 +5,10 @@
 #include <span>
 
 /// @file
-/// Directional albedo of stretched GGX lobes: 12 x 10 x 12 x 11 entries of two 16-bit words (62 KiB), 65535 being 1. Values lie at
-/// the ends of all ranges. Let A be the larger of the two alphas, q the smaller one over it, phi the azimuth of the view
-/// from the axis of A, p = sqrt(A^2 cos^2 phi + (q A)^2 sin^2 phi) the alpha that the view sees. From the fastest axis on:
+/// Directional albedo of stretched GGX lobes: 12 x 10 x 12 x 11 entries of two 16-bit words (62 KiB), 65535 being 1.
+/// Values lie at the ends of all ranges. Let A be the larger of the two alphas, q the smaller one over it, phi the
+/// azimuth of the view from the axis of A, p = sqrt(A^2 cos^2 phi + (q A)^2 sin^2 phi) the alpha that the view sees.
+/// From the fastest axis on:
 ///
 /// axis | coordinate, 0 to 1
 /// 0    | sqrt(mu (1 + 3 p) / (mu + 3 p)), mu the cosine to the normal

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -11,8 +10,8 @@
 #include "materials/tables/interface_table.h"
 
 /// @file
-/// Directional albedos in double precision, by quadrature: what fills materials/tables/interface_table.h. Used by the program
-/// that writes the table and by the tests that compare with it.
+/// Directional albedos in double precision, by quadrature: what fills materials/tables/interface_table.h. Used by the
+/// program that writes the table and by the tests that compare with it.
 ///
 ///     GgxAlbedo rough = ggx_albedo({std::sqrt(1 - mu * mu), 0.0, mu}, {0.3, 0.3}, 128);
 
@@ -51,8 +50,8 @@ inline GgxAlbedo ggx_albedo(glm::dvec3 view, glm::dvec2 alpha, int strata) {
     return {albedo.total / samples, albedo.schlick / samples, albedo.dip / samples};
 }
 
-/// Share of white light from everywhere that a lobe sends towards one direction: integral of `value(light)`, which includes the
-/// cosine to the light, over the hemisphere. For smooth lobes only; 128 strata give five digits of Chan's.
+/// Share of white light from everywhere that a lobe sends towards one direction: integral of `value(light)`, which
+/// includes the cosine to the light, over the hemisphere. For smooth lobes only; 128 strata give five digits of Chan's.
 template <typename Value>
 double hemisphere_integral(int strata, Value&& value) {
     double sum = 0.0;
@@ -85,11 +84,11 @@ inline std::array<double, 4> interface_table_entry(std::uint32_t row, std::uint3
     // At the ends the entries are limits: of a mirror, and of a view along the surface.
     const double roughness = std::max(at_row, 2e-3), alpha = roughness * roughness;
     const double cosine = std::max(lobes.ggx_table_cosine(at_column, alpha), 1e-9);
-    const GgxAlbedo albedo = ggx_albedo(glm::dvec3(std::sqrt(1.0 - cosine * cosine), 0.0, cosine), glm::dvec2(alpha), strata);
+    const GgxAlbedo albedo =
+        ggx_albedo(glm::dvec3(std::sqrt(1.0 - cosine * cosine), 0.0, cosine), glm::dvec2(alpha), strata);
     const double typical = lobes.ggx_typical_cosine(cosine, alpha);
     const double column_cosine = std::max(at_column * at_column, 1e-9);
-    return {1.0 - albedo.total,
-            (albedo.schlick / albedo.total - lobes.power5(1.0 - typical)) * 2.0 + 0.25,
+    return {1.0 - albedo.total, (albedo.schlick / albedo.total - lobes.power5(1.0 - typical)) * 2.0 + 0.25,
             (albedo.dip / albedo.total - lobes.ggx_typical_dip(albedo.schlick / albedo.total)) * 32.0 + 0.75,
             chan_retro_albedo(column_cosine, lobes.chan_sharpness_at(at_row), std::min(strata, 128)) * 32.0};
 }

@@ -70,7 +70,8 @@ class ScatteringLayer {
         Matrix up = product(bounces, r);
         for (std::size_t i = 0; i < up.size(); ++i) up[i] += r[i];
         const Matrix t_up = product(t, up), up_t = product(up, t), t_up_t = product(t_up, t);
-        const Matrix t_bounces = product(t, bounces), bounces_t = product(bounces, t), t_bounces_t = product(t_bounces, t);
+        const Matrix t_bounces = product(t, bounces), bounces_t = product(bounces, t),
+                     t_bounces_t = product(t_bounces, t);
         const Matrix tt = product(t, t);
         std::vector<double> e(size_);
         for (std::size_t i = 0; i < size_; ++i) e[i] = std::exp(-depth_ / cosines_[i]);
@@ -79,8 +80,8 @@ class ScatteringLayer {
             for (std::size_t j = 0; j < size_; ++j) {
                 const std::size_t k = i * size_ + j;
                 new_r[k] += e[i] * up[k] * e[j] + t_up[k] * e[j] + e[i] * up_t[k] + t_up_t[k];
-                new_t[k] += t[k] * e[j] + e[i] * t[k] + e[i] * bounces[k] * e[j] + t_bounces[k] * e[j] + e[i] * bounces_t[k] +
-                            t_bounces_t[k];
+                new_t[k] += t[k] * e[j] + e[i] * t[k] + e[i] * bounces[k] * e[j] + t_bounces[k] * e[j] +
+                            e[i] * bounces_t[k] + t_bounces_t[k];
             }
         }
         reflection_ = std::move(new_r);
@@ -120,7 +121,8 @@ class ScatteringLayer {
     [[nodiscard]] Matrix solve(const Matrix& q) const {
         Matrix left(size_ * size_), right = q;
         for (std::size_t i = 0; i < size_; ++i)
-            for (std::size_t k = 0; k < size_; ++k) left[i * size_ + k] = (i == k ? 1.0 : 0.0) - q[i * size_ + k] * measure(k);
+            for (std::size_t k = 0; k < size_; ++k)
+                left[i * size_ + k] = (i == k ? 1.0 : 0.0) - q[i * size_ + k] * measure(k);
         for (std::size_t column = 0; column < size_; ++column) {
             // The matrix is diagonally dominant enough for elimination without a search.
             const double inverse = 1.0 / left[column * size_ + column];

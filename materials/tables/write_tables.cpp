@@ -50,7 +50,8 @@ void write_anisotropy_table() {
     const auto& size = anisotropy_table_size;
     for (std::uint32_t i = 0; i < size[0] * size[1] * size[2] * size[3]; ++i) {
         const std::uint32_t above = i / size[0], higher = above / size[1];
-        for (const double value : anisotropy_table_entry({i % size[0], above % size[1], higher % size[2], higher / size[2]}, 96))
+        for (const double value :
+             anisotropy_table_entry({i % size[0], above % size[1], higher % size[2], higher / size[2]}, 96))
             words.write(value);
     }
     std::puts("");

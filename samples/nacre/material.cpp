@@ -122,12 +122,13 @@ struct ShaderFigures {
 Expected<ShaderFigures> shader_figures(const FlattenedTree& flat) {
     rhi::ShaderCompiler compiler({.embedded = {embedded_files()}, .debug_information = false});
     const TreeShader shader = tree_shader(flat);
-    const std::string text = fmt::format(R"(
+    const std::string text = fmt::format(R"({}
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0) readonly buffer Parameters {{ float parameters[]; }};
 layout(set = 0, binding = 1) buffer Results {{ vec4 results[]; }};
-#define NACRE_TABLE_SET 0
-#define NACRE_TABLE_BINDING 2
+layout(set = 0, binding = 2) readonly buffer InterfaceTable {{ uint interface_words[]; }};
+layout(set = 0, binding = 3) readonly buffer MediumTable {{ uint medium_words[]; }};
+layout(set = 0, binding = 4) readonly buffer AnisotropyTable {{ uint anisotropy_words[]; }};
 #include "materials/closures/table_buffers.glsl"
 float tree_parameter(uint index) {{ return parameters[index]; }}
 vec4 tree_texture(uint index) {{ return vec4(1.0); }}
@@ -143,7 +144,7 @@ void main() {{
     TreeState state = shade_tree(views, results[0].w);
     results[gl_GlobalInvocationID.x] = vec4(tree_reflected(state, views, lights, results[0].w), state.whole.coverage);
 }})",
-                                         shader.glsl);
+                                         shader.defines, shader.glsl);
     const auto start = std::chrono::steady_clock::now();
     NACRE_TRY(const rhi::ShaderDesc compiled, compiler.compile({.path = "material.comp", .text = text}));
     return ShaderFigures{.bytes = 4 * compiled.spirv.size(),

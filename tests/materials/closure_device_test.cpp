@@ -33,56 +33,13 @@ layout(set = 0, binding = 0) readonly buffer Points { uint points[]; };
 layout(set = 0, binding = 1) writeonly buffer Results { float results[]; };
 layout(set = 0, binding = 2) readonly buffer Table { uint interface_words[]; };
 
-vec4 interface_entry(int column, int row) {
-    int at = 2 * (row * 64 + column);
-    return vec4(unpackUnorm2x16(interface_words[at]), unpackUnorm2x16(interface_words[at + 1]));
-}
-
-vec4 interface_table(vec2 at) {
-    vec2 place = clamp(at, vec2(0.0), vec2(1.0)) * vec2(63.0, 95.0);
-    ivec2 entry = min(ivec2(place), ivec2(62, 94));
-    vec2 part = place - vec2(entry);
-    return mix(mix(interface_entry(entry.x, entry.y), interface_entry(entry.x + 1, entry.y), part.x),
-               mix(interface_entry(entry.x, entry.y + 1), interface_entry(entry.x + 1, entry.y + 1), part.x), part.y);
-}
-
 layout(set = 0, binding = 3) readonly buffer Medium { uint medium_words[]; };
-
-vec2 medium_row(ivec3 at, vec3 part) {
-    int word = (at.z * 41 + at.y) * 16 + at.x;
-    return mix(unpackUnorm2x16(medium_words[word]), unpackUnorm2x16(medium_words[word + 1]), part.x);
-}
-
-vec2 medium_slice(ivec3 at, vec3 part) {
-    return mix(medium_row(at, part), medium_row(ivec3(at.x, at.y + 1, at.z), part), part.y);
-}
-
-vec2 medium_table(vec3 at) {
-    vec3 place = clamp(at, vec3(0.0), vec3(1.0)) * vec3(15.0, 40.0, 23.0);
-    ivec3 entry = min(ivec3(place), ivec3(14, 39, 22));
-    vec3 part = place - vec3(entry);
-    return mix(medium_slice(entry, part), medium_slice(ivec3(entry.x, entry.y, entry.z + 1), part), part.z);
-}
 
 vec3 specular_lut(uint index, vec2 at) { return vec3(at.x, 1.0 - 0.5 * at.y, 0.5 + 0.5 * at.x * at.y); }
 
 layout(set = 0, binding = 4) readonly buffer Anisotropy { uint anisotropy_words[]; };
 
-vec2 anisotropy_table(vec4 at) {
-    vec4 place = clamp(at, vec4(0.0), vec4(1.0)) * vec4(11.0, 9.0, 11.0, 10.0);
-    ivec4 entry = min(ivec4(place), ivec4(10, 8, 10, 9));
-    vec4 part = place - vec4(entry);
-    vec2 sum = vec2(0.0);
-    for (int corner = 0; corner < 16; ++corner) {
-        ivec4 offset = ivec4(corner & 1, corner >> 1 & 1, corner >> 2 & 1, corner >> 3);
-        vec4 weight = mix(vec4(1.0) - part, part, vec4(offset));
-        ivec4 index = entry + offset;
-        int word = ((index.w * 12 + index.z) * 10 + index.y) * 12 + index.x;
-        sum += weight.x * weight.y * weight.z * weight.w * unpackUnorm2x16(anisotropy_words[word]);
-    }
-    return sum;
-}
-
+#include "materials/closures/table_buffers.glsl"
 #include "materials/closures/closure.glsl"
 
 uint place;
@@ -176,13 +133,17 @@ TEST_P(ClosureOnDevice, AgreesWithDoublePrecision) {
         point.random = {random(), random(), random()};
         point.footprint = static_cast<float>(std::pow(10.0, random(-6.0, 2.0)));
     }
-    const auto point_buffer = made((*device)->create_buffer({.size = count * sizeof(Point), .usage = BufferUsage::storage}));
-    const auto result_buffer = made((*device)->create_buffer({.size = count * results_per_point * 4, .usage = BufferUsage::storage}));
+    const auto point_buffer =
+        made((*device)->create_buffer({.size = count * sizeof(Point), .usage = BufferUsage::storage}));
+    const auto result_buffer =
+        made((*device)->create_buffer({.size = count * results_per_point * 4, .usage = BufferUsage::storage}));
     const auto table = interface_table();
-    const auto table_buffer = made((*device)->create_buffer({.size = table.size_bytes(), .usage = BufferUsage::storage}));
+    const auto table_buffer =
+        made((*device)->create_buffer({.size = table.size_bytes(), .usage = BufferUsage::storage}));
     ASSERT_TRUE((*device)->write_buffer(point_buffer, std::span<const Point>(points)));
     ASSERT_TRUE((*device)->write_buffer(table_buffer, table));
-    const auto medium_buffer = made((*device)->create_buffer({.size = medium_table().size_bytes(), .usage = BufferUsage::storage}));
+    const auto medium_buffer =
+        made((*device)->create_buffer({.size = medium_table().size_bytes(), .usage = BufferUsage::storage}));
     ASSERT_TRUE((*device)->write_buffer(medium_buffer, medium_table()));
     const auto anisotropy_buffer =
         made((*device)->create_buffer({.size = anisotropy_table().size_bytes(), .usage = BufferUsage::storage}));
@@ -211,12 +172,13 @@ TEST_P(ClosureOnDevice, AgreesWithDoublePrecision) {
         double error = 0.0, exact = 0.0;
         std::uint32_t point = 0;
     } worst[results_per_point];
-    int beyond = 0;
+    int beyond = 0, other_counts = 0;
     for (std::uint32_t i = 0; i < count; ++i) {
         const Point& point = points[i];
         const float* result = &results[i * results_per_point];
         for (std::uint32_t k = 0; k < results_per_point; ++k)
-            ASSERT_TRUE(std::isfinite(result[k]) && (result[k] >= 0.0f || (k >= 16 && k < 19))) << "point " << i << " result " << k << ": " << result[k];
+            ASSERT_TRUE(std::isfinite(result[k]) && (result[k] >= 0.0f || (k >= 16 && k < 19)))
+                << "point " << i << " result " << k << ": " << result[k];
         const auto closure = library.prepare_closure(Library::slab_of(point.slab), point.view, point.footprint);
         const auto value = library.evaluate_closure(closure, point.light);
         const auto albedo = library.closure_albedo(closure);
@@ -244,16 +206,22 @@ TEST_P(ClosureOnDevice, AgreesWithDoublePrecision) {
         // Of a black closure it does not matter which of its lobes is sampled.
         for (std::uint32_t k = 0; k < (is_black ? 15u : 16u); ++k) {
             // Relative, above an absolute floor of 1e-7: every result here is a share of light or a density of order 1.
-            // A film's reflectance is what is left of 1 after interference: where it is near 0 its last digits are those of 1.
+            // A film's reflectance is what is left of 1 after interference: where it is near 0 its last digits are
+            // those of 1.
             const bool has_film = (point.slab.features & slab_thin_film) != 0;
             const double floor = has_film ? 3e-6 * (k < 3 || k == 15 ? lobe_scale : 1.0) : 1e-7;
-            const double error = std::max(std::abs(result[k] - exact[k]) - floor, 0.0) / std::max(std::abs(exact[k]), 1e-30) *
-                                 (has_film ? 0.1 : 1.0);
+            const double error = std::max(std::abs(result[k] - exact[k]) - floor, 0.0) /
+                                 std::max(std::abs(exact[k]), 1e-30) * (has_film ? 0.1 : 1.0);
+            // The count of facets in a cell may fall to the other side of a whole number.
+            if (k < 3 && (point.slab.features & slab_glints) != 0) {
+                if (error > 1e-3) ++other_counts;
+                continue;
+            }
             if (error > 1e-3) ++beyond;
             if (error > worst[k].error) worst[k] = {error, exact[k], i};
         }
-        // A sample's direction need not be that of double precision (the choice of a lobe may fall the other way); its weight and
-        // density are those of the direction that it has.
+        // A sample's direction need not be that of double precision (the choice of a lobe may fall the other way); its
+        // weight and density are those of the direction that it has.
         if (is_black || result[22] <= 0.0f || result[23] > 0.0f) continue;
         const glm::dvec3 direction(result[16], result[17], result[18]);
         ASSERT_NEAR(glm::length(direction), 1.0, 1e-5);
@@ -262,15 +230,66 @@ TEST_P(ClosureOnDevice, AgreesWithDoublePrecision) {
     }
     for (std::uint32_t k = 0; k < 16; ++k) {
         const Point& point = points[worst[k].point];
-        EXPECT_LE(worst[k].error, 1e-3) << "result " << k << " exact " << worst[k].exact << " roughness " << point.slab.roughness << " anisotropy "
-                                        << point.slab.anisotropy << " features " << point.slab.features << " view " << point.view.x << " "
-                                        << point.view.y << " " << point.view.z << " light " << point.light.x << " " << point.light.y << " "
-                                        << point.light.z << " point " << worst[k].point;
+        EXPECT_LE(worst[k].error, 1e-3) << "result " << k << " exact " << worst[k].exact << " roughness "
+                                        << point.slab.roughness << " anisotropy " << point.slab.anisotropy
+                                        << " features " << point.slab.features << " view " << point.view.x << " "
+                                        << point.view.y << " " << point.view.z << " light " << point.light.x << " "
+                                        << point.light.y << " " << point.light.z << " point " << worst[k].point;
     }
     EXPECT_EQ(beyond, 0);
+    EXPECT_LE(other_counts, static_cast<int>(count / 50));
+    std::printf("%d of %u values differ where glints are counted\n", other_counts, 3 * count / 2);
 }
 
-INSTANTIATE_TEST_SUITE_P(Backends, ClosureOnDevice, ::testing::Values("cpu", "vulkan"),
+/// SPIR-V words of the test's shader with some features, the files of the others replaced.
+std::vector<std::uint32_t> words_of(const std::vector<ShaderDefine>& features, std::span<const EmbeddedFile> files) {
+    ShaderCompiler compiler({.embedded = {files}, .debug_information = false});
+    std::vector<ShaderDefine> defines = features;
+    auto compiled = compiler.compile({.path = "test.comp", .defines = defines, .text = R"(
+layout(local_size_x = 1) in;
+layout(set = 0, binding = 0) buffer Data { float data[]; };
+vec4 interface_table(vec2 at) { return vec4(at.x, at.y, 0.5, 0.25); }
+vec2 medium_table(vec3 at) { return at.xy; }
+vec2 anisotropy_table(vec4 at) { return at.xy; }
+vec3 specular_lut(uint index, vec2 at) { return vec3(at.x, at.y, 1.0); }
+#include "materials/closures/closure.glsl"
+void main() {
+    Slab slab;
+    slab.features = 0u;
+    slab.f0 = vec3(data[0]);
+    slab.roughness = data[1];
+    slab.albedo = vec3(data[2]);
+    Closure closure = prepare_closure(slab, vec3(0.0, 0.0, 1.0), 1.0);
+    data[3] = evaluate_closure(closure, vec3(data[4], data[5], data[6])).specular.x + sample_closure(closure, vec3(data[7])).pdf;
+})"});
+    EXPECT_TRUE(compiled) << compiled.error().message();
+    return compiled ? compiled->spirv : std::vector<std::uint32_t>{};
+}
+
+TEST(ClosureFeatures, WhatASlabDoesNotUseDoesNotExist) {
+    const std::pair<const char*, const char*> optional_files[] = {
+        {"materials/closures/fuzz.glsl", "NACRE_SLAB_FUZZ"},
+        {"materials/closures/glints.glsl", "NACRE_SLAB_GLINTS"},
+        {"materials/closures/medium.glsl", "NACRE_SLAB_MEDIUM"},
+        {"materials/closures/thin_film.glsl", "NACRE_SLAB_THIN_FILM"},
+        {"materials/closures/classic.glsl", ""},
+        {"materials/closures/haze.glsl", ""},
+    };
+    const std::vector<std::uint32_t> plain = words_of({}, embedded_files());
+    for (const auto& [path, macro] : optional_files) {
+        std::vector<EmbeddedFile> files(embedded_files().begin(), embedded_files().end());
+        for (EmbeddedFile& file : files)
+            if (file.path == path) file.text = "#error this feature is not used\n";
+        EXPECT_EQ(words_of({}, files), plain) << path;
+    }
+    // The comparison can fail: with a feature the shader is another.
+    for (const SlabFeature& feature : slab_features()) {
+        if (feature.bit == slab_emission || feature.bit == slab_edge_coverage) continue;
+        EXPECT_NE(words_of({{feature.macro, "1"}}, embedded_files()), plain) << feature.name;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, ClosureOnDevice, ::testing::Values("cpu", "vulkan", "gl"),
                          [](const auto& parameter) { return std::string(parameter.param); });
 
 }  // namespace

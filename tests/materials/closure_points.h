@@ -50,8 +50,8 @@ inline const std::vector<double>& roughnesses() {
     return values;
 }
 
-/// What a closure sends towards its view under white light from everywhere, also from below: lobe by lobe, each by its own sampler over a
-/// stratified grid. `strata` squared samples per lobe; 64 are good for 1e-4.
+/// What a closure sends towards its view under white light from everywhere, also from below: lobe by lobe, each by its
+/// own sampler over a stratified grid. `strata` squared samples per lobe; 64 are good for 1e-4.
 inline glm::dvec3 integrate(Library& library, const Library::Closure& closure, int strata) {
     Library::Closure none = closure;
     none.diffuse = none.fuzz = none.thin = none.subsurface = none.transmission = glm::dvec3(0.0);
@@ -127,6 +127,11 @@ inline Slab random_slab(Random& random, std::uint32_t allowed_features) {
     slab.phase_anisotropy = 0.99f * unit() * (random() < 0.5 ? -1.0f : 1.0f);
     slab.thickness = random() < 0.1 ? 0.0f : decades(-9, 9);
     slab.edge_coverage = unit();
+    slab.glint_density = static_cast<float>(std::pow(10.0, random(-2.0, 8.0)));
+    slab.glint_position = {static_cast<float>(random(-10.0, 10.0)), static_cast<float>(random(-10.0, 10.0))};
+    const auto pixel = static_cast<float>(std::pow(10.0, random(-5.0, 1.0)));
+    slab.glint_dx = {pixel, 0.3f * pixel};
+    slab.glint_dy = {-0.2f * pixel, pixel};
     return slab;
 }
 

@@ -40,7 +40,8 @@ TEST(Lobes, SingleScatteringIsReciprocal) {
         const glm::dvec3 view = random_direction(random), light = random_light(random, view);
         const glm::dvec2 alpha = library.ggx_alpha(random(), random(-1.0, 1.0));
         const auto f = [&](const glm::dvec3& a, const glm::dvec3& b) {
-            return library.ggx_value(a, library.ggx_stretched_length(a, alpha), b, library.half_vector(a, b), alpha) / b.z;
+            return library.ggx_value(a, library.ggx_stretched_length(a, alpha), b, library.half_vector(a, b), alpha) /
+                   b.z;
         };
         ASSERT_NEAR(f(view, light) / f(light, view), 1.0, 1e-9);
         const double gloss = random();
@@ -74,7 +75,8 @@ TEST(Lobes, FuzzIsADensityAndItsAlbedoStaysBelowThree4ths) {
         for (const double cosine : {1e-4, 0.1, 0.5, 1.0}) {
             const auto map = library.sheen_map(direction(cosine, 0.3), roughness);
             const auto crowd = [](double s) { return s * s * (3.0 - 2.0 * s); };
-            // The lobe is a cosine lobe under a map, which crowds where the map squeezes: integrate over its own samples.
+            // The lobe is a cosine lobe under a map, which crowds where the map squeezes: integrate over its own
+            // samples.
             double sum = 0.0;
             const int strata = 100;
             for (int i = 0; i < strata; ++i) {
@@ -82,11 +84,14 @@ TEST(Lobes, FuzzIsADensityAndItsAlbedoStaysBelowThree4ths) {
                     const double s = (i + 0.5) / strata;
                     const glm::dvec3 light = library.sheen_sample(map, crowd(s), (j + 0.5) / strata);
                     EXPECT_GE(light.z, 0.0);
-                    // Density of the sampled point in the original cosine lobe, carried over by the Jacobian of the map.
-                    const double x = map.axis.x * light.x + map.axis.y * light.y, y = map.axis.x * light.y - map.axis.y * light.x;
+                    // Density of the sampled point in the original cosine lobe, carried over by the Jacobian of the
+                    // map.
+                    const double x = map.axis.x * light.x + map.axis.y * light.y,
+                                 y = map.axis.x * light.y - map.axis.y * light.x;
                     const glm::dvec3 original(map.scale * x + map.shear * light.z, map.scale * y, light.z);
                     const double length = glm::length(original);
-                    const double carried = original.z / length / std::numbers::pi * map.scale * map.scale / std::pow(length, 3.0);
+                    const double carried =
+                        original.z / length / std::numbers::pi * map.scale * map.scale / std::pow(length, 3.0);
                     sum += 6.0 * s * (1.0 - s) * library.sheen_density(map, light) / carried;
                 }
             }
@@ -103,12 +108,15 @@ TEST(Lobes, FuzzIsADensityAndItsAlbedoStaysBelowThree4ths) {
 TEST(Lobes, FresnelKeepsItsThreeColorsAndFadesWhereNoMatterReflectsSoLittle) {
     Library library;
     const auto fresnel = library.make_fresnel({0.5, 0.2, 0.1}, {0.5, 0.25, 0.0}, {0.9, 0.5, 1.0});
-    const glm::dvec3 normal = library.fresnel_reflectance(fresnel, 1.0), grazing = library.fresnel_reflectance(fresnel, 0.0);
+    const glm::dvec3 normal = library.fresnel_reflectance(fresnel, 1.0),
+                     grazing = library.fresnel_reflectance(fresnel, 0.0);
     EXPECT_NEAR(glm::distance(normal, glm::dvec3(0.5, 0.2, 0.1)), 0.0, 1e-12);
     EXPECT_NEAR(glm::distance(grazing, glm::dvec3(1.0, 0.5, 0.0)), 0.0, 1e-12) << "F90 has only a color";
     const auto plain = library.make_fresnel({0.5, 0.2, 0.1}, {0.5, 0.25, 0.0}, glm::dvec3(1.0));
-    const glm::dvec3 ratio = library.fresnel_reflectance(fresnel, 1.0 / 7.0) / library.fresnel_reflectance(plain, 1.0 / 7.0);
-    EXPECT_NEAR(glm::distance(ratio, glm::dvec3(0.9, 0.5, 1.0)), 0.0, 1e-6) << "F82 is relative to Schlick's at 82 degrees";
+    const glm::dvec3 ratio =
+        library.fresnel_reflectance(fresnel, 1.0 / 7.0) / library.fresnel_reflectance(plain, 1.0 / 7.0);
+    EXPECT_NEAR(glm::distance(ratio, glm::dvec3(0.9, 0.5, 1.0)), 0.0, 1e-6)
+        << "F82 is relative to Schlick's at 82 degrees";
     const auto none = library.make_fresnel(glm::dvec3(0.0), glm::dvec3(1.0), glm::dvec3(1.0));
     for (const double cosine : {0.0, 0.1, 1.0}) EXPECT_EQ(library.fresnel_reflectance(none, cosine), glm::dvec3(0.0));
     // Mean over the hemisphere against quadrature.
@@ -120,8 +128,8 @@ TEST(Lobes, FresnelKeepsItsThreeColorsAndFadesWhereNoMatterReflectsSoLittle) {
     EXPECT_NEAR(glm::distance(sum, library.fresnel_mean(fresnel)), 0.0, 1e-6);
 }
 
-/// Linear sRGB of a film on a dielectric by the whole Airy series, integrated over frequencies with the color matching functions
-/// as Gaussians; Schlick's formula at both sides, as the lobe has it.
+/// Linear sRGB of a film on a dielectric by the whole Airy series, integrated over frequencies with the color matching
+/// functions as Gaussians; Schlick's formula at both sides, as the lobe has it.
 glm::dvec3 spectral_film(Library& library, double f0, double thickness, double ior, double cosine) {
     const double outer_f0 = library.ior_to_reflectance(ior);
     const double inside = std::sqrt(1.0 - (1.0 - cosine * cosine) / (ior * ior));
@@ -147,7 +155,8 @@ glm::dvec3 spectral_film(Library& library, double f0, double thickness, double i
     };
     const double x = 0.846202 * band(1.6810e6, 4.3278e9) + 0.153798 * band(2.2399e6, 4.5282e9);
     const double y = band(1.7953e6, 9.3046e9), z = band(2.2084e6, 6.6121e9);
-    return {2.6897 * x - 1.2759 * y - 0.4138 * z, -1.0221 * x + 1.9783 * y + 0.0438 * z, 0.0612 * x - 0.2245 * y + 1.1633 * z};
+    return {2.6897 * x - 1.2759 * y - 0.4138 * z, -1.0221 * x + 1.9783 * y + 0.0438 * z,
+            0.0612 * x - 0.2245 * y + 1.1633 * z};
 }
 
 TEST(Lobes, ThinFilmIsTheSpectrumOfAirysSeries) {
@@ -191,7 +200,9 @@ TEST(Lobes, HazeLeavesThePeakOfTheCoreWhereItIs) {
                     EXPECT_LE(haze.f0, 1.0);
                     EXPECT_GE(haze.f0, f0 - 1e-12);
                     EXPECT_TRUE(haze.second_weight >= 0.0 && haze.second_weight <= 1.0);
-                    const auto peak = [&](double r) { return library.ggx_distribution({0.0, 0.0, 1.0}, glm::dvec2(r * r)); };
+                    const auto peak = [&](double r) {
+                        return library.ggx_distribution({0.0, 0.0, 1.0}, glm::dvec2(r * r));
+                    };
                     const double whole = haze.f0 * ((1.0 - haze.second_weight) * peak(roughness) +
                                                     haze.second_weight * peak(haze.second_roughness));
                     EXPECT_NEAR(whole, f0 * peak(roughness), 1e-9 * peak(roughness));

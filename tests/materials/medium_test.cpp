@@ -29,7 +29,8 @@ TEST(Medium, MeanFreePathAndTransmittanceGoThereAndBack) {
         for (const double depth : {1e-12, 1e-6, 1e-3, 1.0, 10.0, 60.0}) {
             const double transmittance = library.medium_transmittance(path, path * depth);
             EXPECT_NEAR(transmittance, std::exp(-depth), 1e-12);
-            EXPECT_NEAR(library.transmittance_to_mean_free_path(transmittance, path * depth) / path, 1.0, depth < 1e-9 ? 1e-3 : 1e-6);
+            EXPECT_NEAR(library.transmittance_to_mean_free_path(transmittance, path * depth) / path, 1.0,
+                        depth < 1e-9 ? 1e-3 : 1e-6);
         }
     }
     EXPECT_EQ(library.medium_transmittance(0.0, 1.0), 0.0);
@@ -53,7 +54,8 @@ double largest_step(Change&& change) {
             double footprint = 1e-3;
             change(slab, footprint, i / 2000.0);
             const auto closure = library.prepare_closure(Library::slab_of(slab), direction(cosine, 0.0), footprint);
-            const glm::dvec3 now[5] = {closure.diffuse, closure.thin, closure.subsurface, closure.transmission, closure.straight};
+            const glm::dvec3 now[5] = {closure.diffuse, closure.thin, closure.subsurface, closure.transmission,
+                                       closure.straight};
             for (int k = 0; k < 5; ++k) {
                 if (i > 0)
                     for (int channel = 0; channel < 3; ++channel)
@@ -66,19 +68,23 @@ double largest_step(Change&& change) {
 }
 
 TEST(Medium, RegimesMeetWithoutAStep) {
-    // 24 decades in 2000 steps are 2.8 % each: nothing that depends on their logarithm smoothly moves by more than that.
+    // 24 decades in 2000 steps are 2.8 % each: nothing that depends on their logarithm smoothly moves by more than
+    // that.
     EXPECT_LT(largest_step([](Slab& slab, double&, double t) {
                   slab.mean_free_path = glm::vec3(static_cast<float>(std::pow(10.0, -12.0 + 24.0 * t)));
-              }), 0.03);
+              }),
+              0.03);
     EXPECT_LT(largest_step([](Slab& slab, double&, double t) {
                   slab.mean_free_path = glm::vec3(1e-3f);
                   slab.thickness = static_cast<float>(std::pow(10.0, -15.0 + 24.0 * t));
-              }), 0.03);
+              }),
+              0.03);
     EXPECT_LT(largest_step([](Slab& slab, double& footprint, double t) {
                   slab.mean_free_path = glm::vec3(1e-3f);
                   slab.thickness = 1.0f;
                   footprint = std::pow(10.0, -12.0 + 24.0 * t);
-              }), 0.03);
+              }),
+              0.03);
 }
 
 TEST(Medium, OpaqueIsTheSlabWithoutAMedium) {
@@ -94,13 +100,17 @@ TEST(Medium, OpaqueIsTheSlabWithoutAMedium) {
         const auto a = library.evaluate_closure(library.prepare_closure(Library::slab_of(plain), view, 1e-2), light);
         const auto b = library.evaluate_closure(library.prepare_closure(Library::slab_of(deep), view, 1e-2), light);
         for (int channel = 0; channel < 3; ++channel)
-            ASSERT_NEAR(a.diffuse[channel], b.diffuse[channel] + b.subsurface[channel], 2e-3 * a.diffuse[channel] + 1e-5);
+            ASSERT_NEAR(a.diffuse[channel], b.diffuse[channel] + b.subsurface[channel],
+                        2e-3 * a.diffuse[channel] + 1e-5);
     }
 }
 
 TEST(Medium, WithoutScatteringOnlyBeerAndLambertAreLeft) {
     Library library;
-    Slab slab{.features = slab_medium, .f0 = glm::vec3(0.0f), .albedo = glm::vec3(0.0f), .mean_free_path = {1e-3f, 2e-3f, 1e9f}};
+    Slab slab{.features = slab_medium,
+              .f0 = glm::vec3(0.0f),
+              .albedo = glm::vec3(0.0f),
+              .mean_free_path = {1e-3f, 2e-3f, 1e9f}};
     for (const double cosine : {0.1, 0.5, 1.0}) {
         const auto closure = library.prepare_closure(Library::slab_of(slab), direction(cosine, 0.0), 1e-3);
         const glm::dvec3 expected(std::exp(-1.0 / cosine), std::exp(-0.5 / cosine), 1.0);
@@ -115,7 +125,8 @@ TEST(Medium, WithoutScatteringOnlyBeerAndLambertAreLeft) {
 
 TEST(Medium, FarAwayASolidIsOpaqueAndNearItBleeds) {
     Library library;
-    Slab slab{.features = slab_medium, .f0 = glm::vec3(0.04f), .albedo = glm::vec3(0.5f), .mean_free_path = glm::vec3(1e-3f)};
+    Slab slab{
+        .features = slab_medium, .f0 = glm::vec3(0.04f), .albedo = glm::vec3(0.5f), .mean_free_path = glm::vec3(1e-3f)};
     slab.thickness = INFINITY;
     const auto far_away = library.prepare_closure(Library::slab_of(slab), direction(0.7, 0.0), 1.0);
     const auto near_by = library.prepare_closure(Library::slab_of(slab), direction(0.7, 0.0), 1e-6);

@@ -38,9 +38,8 @@ TEST(InterfaceTable, BetweenEntriesTheErrorIsBelowOneIn1000) {
         dip = std::max(dip, std::abs(table.dip - exact.dip / exact.total));
         if (i % 20 != 0) continue;
         const double gloss = library.chan_gloss(roughness);
-        const double albedo = hemisphere_integral(96, [&](const glm::dvec3& light) {
-            return library.chan_diffuse(direction(cosine, 0.0), light, gloss);
-        });
+        const double albedo = hemisphere_integral(
+            96, [&](const glm::dvec3& light) { return library.chan_diffuse(direction(cosine, 0.0), light, gloss); });
         chan = std::max(chan, std::abs(library.chan_albedo_by_table(cosine, gloss) / albedo - 1.0));
     }
     EXPECT_LT(total, 5e-4);
@@ -53,7 +52,8 @@ TEST(InterfaceTable, BetweenEntriesTheErrorIsBelowOneIn1000) {
 TEST(AnisotropyTable, EntriesAreThoseOfTheGenerator) {
     for (std::uint32_t i = 0; i < 12 * 10 * 12 * 11; i += 199) {
         const auto entry = anisotropy_table_entry({i % 12, i / 12 % 10, i / 120 % 12, i / 1440}, 96);
-        for (int word = 0; word < 2; ++word) EXPECT_NEAR(anisotropy_table()[2 * i + word] / 65535.0, entry[word], 1e-5) << i;
+        for (int word = 0; word < 2; ++word)
+            EXPECT_NEAR(anisotropy_table()[2 * i + word] / 65535.0, entry[word], 1e-5) << i;
     }
 }
 
@@ -67,8 +67,8 @@ TEST(MediumTable, EntriesAreThoseOfTheGenerator) {
     }
 }
 
-/// Reflection of an infinitely thick medium by Chandrasekhar's H function, 1 - sqrt(1 - albedo) H(cosine), which is found as the
-/// fixed point of 1 / H = sqrt(1 - albedo) + albedo / 2 integral of m H(m) / (cosine + m).
+/// Reflection of an infinitely thick medium by Chandrasekhar's H function, 1 - sqrt(1 - albedo) H(cosine), which is
+/// found as the fixed point of 1 / H = sqrt(1 - albedo) + albedo / 2 integral of m H(m) / (cosine + m).
 double chandrasekhar(double albedo, double cosine) {
     constexpr int count = 800;
     const auto node = [](int i) { return (i + 0.5) / count; };
@@ -121,7 +121,10 @@ TEST(MediumTable, BetweenEntriesTheErrorIsSmall) {
         const auto scattering = library.medium_scattering(albedo, layer.depth(), 0.0, cosine);
         // The table's own share, without the turn towards the authored albedo that opaque media take.
         const auto infinite = library.medium_table({std::sqrt(cosine), 1.0, std::sqrt(similarity)});
-        const double turn = similarity > 0.0 ? std::lerp(1.0, albedo / ((1.0 - similarity * similarity) * infinite.y + 1e-30), scattering.opaque) : 1.0;
+        const double turn =
+            similarity > 0.0
+                ? std::lerp(1.0, albedo / ((1.0 - similarity * similarity) * infinite.y + 1e-30), scattering.opaque)
+                : 1.0;
         reflected = std::max(reflected, std::abs(scattering.reflected / turn - layer.reflected(0)));
         through = std::max(through, std::abs(scattering.through - layer.through(0)));
     }

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef NACRE_CLOSURES_CLASSIC
+#define NACRE_CLOSURES_CLASSIC
+#include "materials/closures/math.glsl"
+
+// Lobes that real-time renderers are used to, as published, beside those that the slab is made of: cheaper, with errors
+// that are measured (docs/materials.md). Roughness is perceptual; alpha is its square. Diffuse lobes include the cosine
+// of light.
+
+// Source: Burley 2012 and Lagarde and de Rousiers 2014, "Moving Frostbite to physically based rendering".
+float disney_diffuse(vec3 view, vec3 light, float roughness) {
+    if (light.z <= 0.0) return 0.0;
+    float half_cosine = half_vector_cosine(view, light);
+    float rise = 0.5 * roughness + 2.0 * half_cosine * half_cosine * roughness - 1.0;
+    float light_scatter = 1.0 + rise * power5(1.0 - min(light.z, 1.0));
+    float view_scatter = 1.0 + rise * power5(1.0 - min(view.z, 1.0));
+    return light_scatter * view_scatter * mix(1.0, 1.0 / 1.51, roughness) * light.z / pi;
+}
+
+// Diffuse of woven fabric: darker the rougher, and wrapped around the terminator by w (0.5 as published). The wrapped
+// cosine is normalized: what the lobe of roughness 0 reflects of white light stays 1.
+float fabric_diffuse(vec3 light, float roughness, float wrap) {
+    float wrapped = saturated((light.z + wrap) / square(1.0 + wrap));
+    return mix(1.0, 0.5, roughness) * wrapped / pi;
+}
+
+// Visibilities: masking and shadowing over 4 view.z light.z.
+
+// Source: Kelemen and Szirmay-Kalos 2001; for coats, whatever their roughness.
+float kelemen_visibility(float half_cosine) { return 0.25 / max(half_cosine * half_cosine, 1e-5); }
+
+// Source: Neubelt and Pettineo 2013, "Crafting a next-gen material pipeline for The Order: 1886".
+float neubelt_visibility(float view_cosine, float light_cosine) {
+    return 1.0 / max(4.0 * (light_cosine + view_cosine - light_cosine * view_cosine), 1e-7);
+}
+
+// Distributions of fibers that stand on a surface, by the cosine of the half vector to the normal; 1 / pi included.
+
+// Source: Ashikhmin and Premoze 2007, "Distribution-based BRDFs".
+float ashikhmin_distribution(float normal_half, float alpha) {
+    float a2 = max(alpha * alpha, 1e-8);
+    float cos2 = normal_half * normal_half;
+    float sin2 = max(1.0 - cos2, 1e-6);
+    float sin4 = sin2 * sin2;
+    return (4.0 * exp(-cos2 / (sin2 * a2)) + sin4) / (pi * (1.0 + 4.0 * a2) * sin4);
+}
+
+// Source: Estevez and Kulla 2017, "Production friendly microfacet sheen BRDF". Below a roughness of 0.1 it reflects
+// more than it gets with most visibilities.
+float charlie_distribution(float normal_half, float roughness) {
+    float exponent = 1.0 / clamp(roughness, 0.01, 1.0);
+    float sin2 = clamp(1.0 - normal_half * normal_half, 1e-9, 1.0);
+    return (2.0 + exponent) * pow(sin2, 0.5 * exponent) / (2.0 * pi);
+}
+
+float charlie_log_lambda(float cos_theta, float roughness) {
+    float r = square(1.0 - saturated(roughness));
+    float a = mix(21.5473, 25.3245, r);
+    float b = mix(3.82987, 3.32435, r);
+    float c = mix(0.19823, 0.16801, r);
+    float d = mix(-1.97760, -1.27393, r);
+    float e = mix(-4.32054, -4.85967, r);
+    return a / (1.0 + b * pow(max(cos_theta, 1e-9), c)) + d * cos_theta + e;
+}
+
+float charlie_lambda(float cos_theta, float roughness) {
+    if (cos_theta < 0.5) return exp(charlie_log_lambda(cos_theta, roughness));
+    return exp(2.0 * charlie_log_lambda(0.5, roughness) - charlie_log_lambda(1.0 - cos_theta, roughness));
+}
+
+// Softens the terminator, which is no physics but wanted by authors.
+float charlie_softened(float lambda, float cos_theta) {
+    float m = 1.0 - saturated(cos_theta);
+    float m8 = square(square(m * m));
+    return pow(lambda, 1.0 + 2.0 * m8);
+}
+
+float charlie_visibility(float view_cosine, float light_cosine, float roughness, bool is_softened) {
+    float view_lambda = charlie_lambda(view_cosine, roughness);
+    float light_lambda = charlie_lambda(light_cosine, roughness);
+    if (is_softened) {
+        view_lambda = charlie_softened(view_lambda, view_cosine);
+        light_lambda = charlie_softened(light_lambda, light_cosine);
+    }
+    return 1.0 / max((1.0 + view_lambda + light_lambda) * 4.0 * view_cosine * light_cosine, 1e-9);
+}
+
+// Reflectance of what lies under a coat of index 1.5, a cubic fit of reflectance_under.
+float reflectance_under_coat_fit(float f0) {
+    return saturated(f0 * (f0 * (0.941892 - 0.263008 * f0) + 0.346479) - 0.0285998);
+}
+
+#endif
