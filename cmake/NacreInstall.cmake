@@ -29,7 +29,10 @@ set(public_headers
   materials/closures/features.glsl materials/closures/fresnel.glsl materials/closures/fuzz.glsl
   materials/closures/ggx.glsl materials/closures/glints.glsl materials/closures/haze.glsl materials/closures/math.glsl
   materials/closures/medium.glsl materials/closures/slab.glsl materials/closures/tables.glsl
-  materials/closures/thin_film.glsl
+  materials/closures/blending.glsl materials/closures/operators.glsl materials/closures/table_buffers.glsl
+  materials/closures/thin_film.glsl materials/builtin_materials.h materials/description_tree.h materials/evaluation.h
+  materials/preview.h materials/simplification.h materials/storage.h materials/topology.h materials/tree.h
+  materials/tree_json.h materials/tree_shader.h
   scene/builtin.h scene/environment.h scene/load.h scene/scene.h scene/shapes.h scene/tangents.h
   passes/frame_graph.h passes/gbuffer_layout.h passes/plan.h passes/profiles.h passes/renderer.h
   measure/comparison_page.h measure/cross_backend.h measure/flip.h measure/frame_times.h measure/image_metrics.h
