@@ -136,6 +136,46 @@ NACRE_INLINE Ints<W> gather_small_texels(const std::byte* base, Ints<W> offset, 
 #endif
 }
 
+#ifdef __AVX512VBMI__
+/// table[byte] for the three lower bytes of each lane, from a table of 256 floats that is kept by bytes: byte k of entry
+/// i at 256 * k + i, aligned to 64. Permutations of registers look up all channels of all lanes at once, which takes a
+/// fifth of the time of gathers.
+template <int W>
+NACRE_INLINE void look_up_three_bytes(const std::byte* table, Ints<W> word, Floats<W>* out) {
+    __m512i codes;
+    if constexpr (W == 16)
+        codes = (__m512i)word;
+    else if constexpr (W == 8)
+        codes = (__m512i)__builtin_shufflevector(word, word, 0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7);
+    else
+        codes = (__m512i)__builtin_shufflevector(word, word, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3);
+    // In each part of four lanes, the bytes of one channel side by side.
+    const __m512i by_channel = _mm512_set4_epi32(0x0f0b0703, 0x0e0a0602, 0x0d090501, 0x0c080400);
+    codes = _mm512_shuffle_epi8(codes, by_channel);
+    const __mmask64 is_upper = _mm512_movepi8_mask(codes);
+    __m512i bytes[4];
+    for (int k = 0; k < 4; ++k) {
+        const auto part = [&](int i) { return _mm512_load_si512(table + 256 * k + 64 * i); };
+        const __m512i lower = _mm512_permutex2var_epi8(part(0), codes, part(1));
+        const __m512i upper = _mm512_permutex2var_epi8(part(2), codes, part(3));
+        bytes[k] = _mm512_mask_blend_epi8(is_upper, lower, upper);
+    }
+    const __m512i low_01 = _mm512_unpacklo_epi8(bytes[0], bytes[1]), low_23 = _mm512_unpacklo_epi8(bytes[2], bytes[3]);
+    const __m512i high_01 = _mm512_unpackhi_epi8(bytes[0], bytes[1]), high_23 = _mm512_unpackhi_epi8(bytes[2], bytes[3]);
+    const __m512i channels[3] = {_mm512_unpacklo_epi16(low_01, low_23), _mm512_unpackhi_epi16(low_01, low_23),
+                                 _mm512_unpacklo_epi16(high_01, high_23)};
+    for (int c = 0; c < 3; ++c) {
+        const auto all = (Floats<16>)channels[c];
+        if constexpr (W == 16)
+            out[c] = all;
+        else if constexpr (W == 8)
+            out[c] = __builtin_shufflevector(all, all, 0, 1, 2, 3, 4, 5, 6, 7);
+        else
+            out[c] = __builtin_shufflevector(all, all, 0, 1, 2, 3);
+    }
+}
+#endif
+
 /// One bit for each lane of a mask.
 template <int W>
 NACRE_INLINE std::uint32_t mask_bits(Ints<W> mask) {

@@ -104,9 +104,16 @@ NACRE_INLINE Floats<W> decode_channel(const ChannelPlan& channel, Ints<W> word) 
     }
 }
 
+/// Linear values of the codes in the three lower bytes.
 template <int W>
-NACRE_INLINE Floats<W> srgb_channel(const std::byte* table, Ints<W> word, int shift) {
-    return (Floats<W>)gather_words<W>(table, (Ints<W>)((Uints<W>)word >> static_cast<unsigned>(shift) << 2) & 1020);
+NACRE_INLINE void decode_srgb(Ints<W> word, Floats<W>* out) {
+#ifdef __AVX512VBMI__
+    look_up_three_bytes<W>(srgb_to_linear_bytes(), word, out);
+#else
+    const auto* table = reinterpret_cast<const std::byte*>(srgb_to_linear_table());
+    for (unsigned c = 0; c < 3; ++c)
+        out[c] = (Floats<W>)gather_words<W>(table, (Ints<W>)((Uints<W>)word >> (8 * c) << 2) & 1020);
+#endif
 }
 
 /// Blocks have no form that all lanes could decode at once: each lane takes its texel from the cache of decoded blocks.
@@ -187,8 +194,7 @@ NACRE_INLINE void decode_raw(const Ints<W>* words, Floats<W>* out) {
     } else if constexpr (C == Codec::rgba8 || C == Codec::srgb8) {
         const Ints<W> word = words[0];
         if constexpr (C == Codec::srgb8) {
-            const auto* table = reinterpret_cast<const std::byte*>(srgb_to_linear_table());
-            for (int c = 0; c < 3; ++c) out[c] = srgb_channel<W>(table, word, 8 * c);
+            decode_srgb<W>(word, out);
         } else {
             for (int c = 0; c < 3; ++c) out[c] = to_floats<W>((word >> (8 * c)) & 255);
         }
