@@ -92,7 +92,9 @@ void Emitter::find_uses(const Function& function, Shape& shape) const {
     }
     const auto use = [&](Id id, std::uint32_t block) {
         const auto found = shape.uses.find(id);
-        if (found == shape.uses.end() || found->second.home == block) return;
+        if (found == shape.uses.end()) return;
+        found->second.is_used = true;
+        if (found->second.home == block) return;
         found->second.last = std::max(found->second.last, block);
         const std::uint32_t loop = shape.blocks[found->second.home].divergent_loop;
         if (loop != ~0u && (block < loop || block >= shape.blocks[loop].end)) found->second.is_leaving = true;

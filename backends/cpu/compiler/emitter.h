@@ -322,6 +322,11 @@ class Emitter {
     /// Runs `body` for each different address in the lanes of `mask`: once where it is uniform.
     void for_each_different(const Component& address, llvm::Value* mask,
                             const std::function<void(llvm::Value*, llvm::Value*)>& body);
+    /// What an atomic operation on integers leaves behind.
+    llvm::Value* combine(llvm::AtomicRMWInst::BinOp operation, llvm::Value* old, llvm::Value* value);
+    /// The same operation once for all lanes of `lanes_on`, where the order of the lanes makes no difference: the value
+    /// that stands for all of theirs. Null: there is none.
+    llvm::Value* combine_lanes(llvm::AtomicRMWInst::BinOp operation, const Component& value, llvm::Value* lanes_on);
     /// Runs `body` for each lane of `mask` in turn.
     void for_each_lane(llvm::Value* mask, const std::function<void(llvm::Value* lane)>& body);
 
@@ -456,6 +461,7 @@ class Emitter {
             std::uint32_t last = 0;              ///< Last block that uses it.
             bool is_leaving = false;             ///< Used behind a loop that lanes leave one by one, made inside.
             bool is_remade = false;              ///< A pointer or image: behind such loops made again from its operands.
+            bool is_used = false;                ///< Somewhere at all.
         };
         std::vector<BlockShape> blocks;
         std::unordered_map<Id, Use> uses;
