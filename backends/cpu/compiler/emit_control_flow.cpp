@@ -147,6 +147,9 @@ void Emitter::merge(std::size_t first_change, llvm::BasicBlock* skipped, llvm::B
             either->addIncoming(now, ran);
             either->addIncoming(before, skipped);
             *change.place = either;
+            // Behind code that was skipped nobody reads the value.
+            if (llvm::isa<llvm::UndefValue>(before) && now->getType()->isIntOrIntVectorTy(32))
+                if (const RowShape shape = row_shape(now); shape != RowShape::other) row_shapes[either] = shape;
         }
         changes[kept++] = change;
     }

@@ -22,13 +22,16 @@ constexpr float whole_numbers = 12582912.0f;
 
 }  // namespace
 
-Emitter::RowShape Emitter::row_shape(llvm::Value* value) const {
+Emitter::RowShape Emitter::row_shape(llvm::Value* value, std::uint32_t depth) const {
+    // From an invocation's place in its workgroup to a coordinate it is never far.
+    constexpr std::uint32_t most_steps = 6;
+    if (depth > most_steps) return RowShape::other;
     if (!value->getType()->isVectorTy()) return RowShape::equal;
     if (const auto found = row_shapes.find(value); found != row_shapes.end()) return found->second;
     if (llvm::getSplatValue(value)) return RowShape::equal;
     const auto* made = llvm::dyn_cast<llvm::BinaryOperator>(value);
     if (!made) return RowShape::other;
-    const RowShape a = row_shape(made->getOperand(0)), b = row_shape(made->getOperand(1));
+    const RowShape a = row_shape(made->getOperand(0), depth + 1), b = row_shape(made->getOperand(1), depth + 1);
     if (a == RowShape::other || b == RowShape::other) return RowShape::other;
     if (a == RowShape::equal && b == RowShape::equal) return RowShape::equal;
     if (made->getOpcode() == llvm::Instruction::Add && a != b) return RowShape::rising;

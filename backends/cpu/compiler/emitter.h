@@ -280,7 +280,7 @@ class Emitter {
                         const std::vector<Component>& texel, const std::function<void()>& otherwise);
     /// What a value does from lane to lane inside of a row of `row_lanes` lanes.
     enum class RowShape : std::uint8_t { other, equal, rising };  ///< rising: by one.
-    [[nodiscard]] RowShape row_shape(llvm::Value* value) const;
+    [[nodiscard]] RowShape row_shape(llvm::Value* value, std::uint32_t depth = 0) const;
     /// Whether the first `count` coordinates mean texels side by side in every row of lanes.
     [[nodiscard]] bool are_rows(const std::vector<Component>& coordinates, std::size_t count) const;
     [[nodiscard]] std::uint32_t row_lanes() const;
