@@ -21,7 +21,12 @@ template <int W, Codec C>
     Floats<W> sum[4] = {};
     for (int first = 0; first < taps.count; first += 2) {
         Floats<W> texels[2][4];
-        load_two_raw<W, C>(source, taps.places[first], taps.places[first + 1], texels);
+        bool are_neighbors = false;
+        if constexpr (raw_words<C> != 0) {
+            const Ints<W> behind = taps.places[first].offset + 4 * raw_words<C>;
+            are_neighbors = mask_bits<W>(taps.places[first + 1].offset == behind) == all_lanes<W>;
+        }
+        load_two_raw<W, C>(source, taps.places[first], taps.places[first + 1], are_neighbors, texels);
         for (int i = 0; i < 2; ++i) {
             const int tap = first + i;
             Floats<W>* const texel = texels[i];
@@ -126,26 +131,33 @@ NACRE_INLINE void footprint(const Sampling<W>& sampling, const Source& source, c
                  {sampler.address_u, sampler.address_v, sampler.address_w}, offset, taps);
 }
 
+/// Adds two texels of a footprint, with their weights.
+template <int W, Codec C>
+NACRE_INLINE void add_two_texels(const Source& source, const Place<W>& first, const Place<W>& second,
+                                 bool are_neighbors, Floats<W> first_weight, Floats<W> second_weight, Floats<W>* sum) {
+    Floats<W> texels[2][4];
+    load_two_raw<W, C>(source, first, second, are_neighbors, texels);
+    const int channels = raw_channels<C>(*source.plan);
+    for (int c = 0; c < channels; ++c) sum[c] = sum[c] + first_weight * texels[0][c];
+    for (int c = 0; c < channels; ++c) sum[c] = sum[c] + second_weight * texels[1][c];
+}
+
 /// A linear sample of a cube whose footprint lies on one face in all lanes. False: it does not, and nothing was done.
 template <int W, Codec C>
 [[gnu::noinline]] bool sample_face(const Source& source, const CubeProjection<W>& cube, Ints<W> first_slice,
                                    Floats<W>* out) {
     const CubeCorner<W> corner = cube_corner<W>(source.width, cube);
     if (corner.crosses) return false;
-    const int channels = raw_channels<C>(*source.plan);
     const Place<W> place = place_texel<W>(source, corner.x, corner.y, first_slice + cube.face);
     Floats<W> sum[4] = {};
-    for (int row = 0; row < 2; ++row) {
+    const auto add_row = [&](Ints<W> offset, Floats<W> weight_y) {
         Place<W> first, second;
-        first.offset = place.offset + row * source.row_stride, second.offset = first.offset + 4 * raw_words<C>;
-        Floats<W> texels[2][4];
-        load_two_raw<W, C>(source, first, second, texels);
-        for (int i = 0; i < 2; ++i) {
-            const Floats<W> weight =
-                (i == 0 ? 1.0f - corner.fx : corner.fx) * (row == 0 ? 1.0f - corner.fy : corner.fy);
-            for (int c = 0; c < channels; ++c) sum[c] = sum[c] + weight * texels[i][c];
-        }
-    }
+        first.offset = offset, second.offset = offset + 4 * raw_words<C>;
+        add_two_texels<W, C>(source, first, second, true, (1.0f - corner.fx) * weight_y, corner.fx * weight_y, sum);
+    };
+    add_row(place.offset, 1.0f - corner.fy);
+    add_row(place.offset + source.row_stride, corner.fy);
+    const int channels = raw_channels<C>(*source.plan);
     for (int c = 0; c < channels; ++c) out[c] = sum[c];
     finish_raw<W, C>(*source.plan, out);
     return true;
@@ -269,6 +281,40 @@ struct PlainSampling {
     bool is_linear;
 };
 
+/// The two texels along one axis, without border and offset: as `linear_axis`.
+template <int W>
+struct PlainAxis {
+    Ints<W> first, second;
+    Floats<W> weight;    ///< Of the second.
+    bool are_neighbors;  ///< The second lies behind the first in all lanes.
+};
+template <int W>
+NACRE_INLINE PlainAxis<W> plain_axis(Floats<W> s, std::int32_t n, rhi::AddressMode mode) {
+    PlainAxis<W> axis;
+    if (mode == rhi::AddressMode::mirrored_repeat) {
+        const AxisTaps<W> taps = linear_axis<W>(s, n, mode, nullptr);
+        axis.first = taps.first, axis.second = taps.second, axis.weight = taps.weight;
+        axis.are_neighbors = mask_bits<W>(taps.second == taps.first + 1) == all_lanes<W>;
+        return axis;
+    }
+    const Floats<W> u = unnormalized<W>(s, n, mode) - 0.5f, whole = floor_small<W>(u);
+    axis.weight = u - whole;
+    const Ints<W> first = truncate<W>(whole), second = first + 1;
+    const Ints<W> is_out = (first < 0) | (second >= n);
+    axis.are_neighbors = mask_bits<W>(is_out) == 0;
+    axis.first = first, axis.second = second;
+    if (axis.are_neighbors) return axis;
+    if (mode == rhi::AddressMode::repeat) {
+        // From -1 to n.
+        axis.first = first < 0 ? splat<W>(n - 1) : first;
+        axis.second = second >= n ? splat<W>(0) : second;
+    } else {
+        axis.first = clamp<W>(first, 0, n - 1);
+        axis.second = clamp<W>(second, 0, n - 1);
+    }
+    return axis;
+}
+
 template <int W, Codec C>
 [[gnu::noinline]] void sample_plain_once(const PlainSampling<W>& sampling, const Source& source, Floats<W> s,
                                          Floats<W> t, Floats<W>* out) {
@@ -282,23 +328,20 @@ template <int W, Codec C>
         place.offset = x.first * bytes + y.first * source.row_stride + slice;
         load_raw<W, C>(source, place, out);
     } else {
-        const int channels = raw_channels<C>(plan);
-        const AxisTaps<W> x = linear_axis<W>(s, source.width, sampling.u, nullptr);
-        const AxisTaps<W> y = linear_axis<W>(t, source.height, sampling.v, nullptr);
+        const PlainAxis<W> x = plain_axis<W>(s, source.width, sampling.u);
+        const PlainAxis<W> y = plain_axis<W>(t, source.height, sampling.v);
         const Ints<W> left = x.first * bytes, right = x.second * bytes;
         Floats<W> sum[4] = {};
-        for (int row = 0; row < 2; ++row) {
-            const Ints<W> above = (row == 0 ? y.first : y.second) * source.row_stride + slice;
-            const Floats<W> weight_y = row == 0 ? 1.0f - y.weight : y.weight;
+        const auto add_row = [&](Ints<W> row, Floats<W> weight_y) {
+            const Ints<W> above = row * source.row_stride + slice;
             Place<W> first, second;
             first.offset = left + above, second.offset = right + above;
-            Floats<W> texels[2][4];
-            load_two_raw<W, C>(source, first, second, texels);
-            const Floats<W> weights[2] = {(1.0f - x.weight) * weight_y, x.weight * weight_y};
-            for (int i = 0; i < 2; ++i) {
-                for (int c = 0; c < channels; ++c) sum[c] = sum[c] + weights[i] * texels[i][c];
-            }
-        }
+            add_two_texels<W, C>(source, first, second, x.are_neighbors, (1.0f - x.weight) * weight_y,
+                                 x.weight * weight_y, sum);
+        };
+        add_row(y.first, 1.0f - y.weight);
+        add_row(y.second, y.weight);
+        const int channels = raw_channels<C>(plan);
         for (int c = 0; c < channels; ++c) out[c] = sum[c];
     }
     finish_raw<W, C>(plan, out);

@@ -115,6 +115,39 @@ NACRE_INLINE void gather_pairs(const std::byte* base, Ints<W> offset, Ints<W>& f
     second = gather_words<W>(base + 4, offset);
 }
 
+/// The four words at base + offset[lane]. Whole loads that are sorted afterwards take half of the time of gathers.
+template <int W>
+NACRE_INLINE void gather_quads(const std::byte* base, Ints<W> offset, Ints<W>* words) {
+#ifdef __AVX512F__
+    if constexpr (W == 16) {
+        // The fours of lane i lie where those of lanes i, i + 4, i + 8, i + 12 make one register.
+        alignas(64) std::int32_t places[W];
+        __builtin_memcpy(places, &offset, sizeof places);
+        const auto four = [&](int lane) {
+            return _mm_loadu_si128(reinterpret_cast<const __m128i*>(base + places[lane]));
+        };
+        __m512i fours[4];
+        for (int i = 0; i < 4; ++i) {
+            const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(four(i)), four(i + 4), 1);
+            const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(four(i + 8)), four(i + 12), 1);
+            fours[i] = (__m512i)__builtin_shufflevector((Ints<8>)low, (Ints<8>)high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
+                                                        11, 12, 13, 14, 15);
+        }
+        const auto low = [](__m512i a, __m512i b) { return _mm512_maskz_unpacklo_epi32(0xffff, a, b); };
+        const auto high = [](__m512i a, __m512i b) { return _mm512_maskz_unpackhi_epi32(0xffff, a, b); };
+        const __m512i low_01 = low(fours[0], fours[1]), low_23 = low(fours[2], fours[3]);
+        const __m512i high_01 = high(fours[0], fours[1]), high_23 = high(fours[2], fours[3]);
+        words[0] = (Ints<W>)_mm512_maskz_unpacklo_epi64(0xff, low_01, low_23);
+        words[1] = (Ints<W>)_mm512_maskz_unpackhi_epi64(0xff, low_01, low_23);
+        words[2] = (Ints<W>)_mm512_maskz_unpacklo_epi64(0xff, high_01, high_23);
+        words[3] = (Ints<W>)_mm512_maskz_unpackhi_epi64(0xff, high_01, high_23);
+        return;
+    }
+#endif
+    gather_pairs<W>(base, offset, words[0], words[1]);
+    gather_pairs<W>(base + 8, offset, words[2], words[3]);
+}
+
 /// Texels of 1 or 2 bytes at base + offset[lane], in the low bits; what is above does not matter. Gathers read aligned
 /// words, so that nothing behind the last texel's own word is touched.
 template <int W>
@@ -208,6 +241,22 @@ NACRE_INLINE Floats<W> square_root(Floats<W> x) {
     for (int lane = 0; lane < W; ++lane) root[lane] = __builtin_sqrtf(x[lane]);
     return root;
 }
+
+#ifdef __SSE4_1__
+#define NACRE_NATIVE_FLOOR
+/// The largest whole number that is not above x; infinities and NaN stay.
+template <int W>
+NACRE_INLINE Floats<W> floor_natively(Floats<W> x) {
+#ifdef __AVX512F__
+    if constexpr (W == 16)
+        return (Floats<W>)_mm512_maskz_roundscale_ps(0xffff, (__m512)x, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
+#endif
+#ifdef __AVX__
+    if constexpr (W == 8) return (Floats<W>)_mm256_floor_ps((__m256)x);
+#endif
+    if constexpr (W == 4) return (Floats<W>)_mm_floor_ps((__m128)x);
+}
+#endif
 
 /// x / divisor as IEEE 754 rounds it; the divisor is a whole number below 2^24 and |x| is 0 or above 2^-60. By the
 /// reciprocal and the exact remainder where there are fused operations: Markstein, "Computation of elementary functions

@@ -250,14 +250,14 @@ NACRE_INLINE void load_raw(const Source& source, const Place<W>& place, Floats<W
     }
 }
 
-/// Two texels of each lane. Where the second lies behind the first in all lanes, as it mostly does in a footprint, both
-/// are read at once.
+/// Two texels of each lane. `are_neighbors`: the second lies behind the first in all lanes, as it mostly does in a
+/// footprint, and both are read at once.
 template <int W, Codec C>
-NACRE_INLINE void load_two_raw(const Source& source, const Place<W>& first, const Place<W>& second,
+NACRE_INLINE void load_two_raw(const Source& source, const Place<W>& first, const Place<W>& second, bool are_neighbors,
                                Floats<W> (&out)[2][4]) {
     if constexpr (raw_words<C> == 1) {
         Ints<W> words[2];
-        if (mask_bits<W>(second.offset == first.offset + 4) == all_lanes<W>) {
+        if (are_neighbors) {
             gather_pairs<W>(source.base, first.offset, words[0], words[1]);
         } else {
             words[0] = gather_words<W>(source.base, first.offset);
@@ -265,6 +265,16 @@ NACRE_INLINE void load_two_raw(const Source& source, const Place<W>& first, cons
         }
         decode_raw<W, C>(&words[0], out[0]);
         decode_raw<W, C>(&words[1], out[1]);
+    } else if constexpr (raw_words<C> == 2) {
+        Ints<W> words[4];
+        if (are_neighbors) {
+            gather_quads<W>(source.base, first.offset, words);
+        } else {
+            gather_pairs<W>(source.base, first.offset, words[0], words[1]);
+            gather_pairs<W>(source.base, second.offset, words[2], words[3]);
+        }
+        decode_raw<W, C>(&words[0], out[0]);
+        decode_raw<W, C>(&words[2], out[1]);
     } else {
         load_raw<W, C>(source, first, out[0]);
         load_raw<W, C>(source, second, out[1]);
