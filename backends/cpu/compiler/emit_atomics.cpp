@@ -48,6 +48,27 @@ void Emitter::for_each_different(const Component& address, llvm::Value* lanes_on
     builder.SetInsertPoint(after);
 }
 
+namespace {
+
+/// Whether the order of the lanes makes no difference to what an operation leaves behind.
+bool can_combine(llvm::AtomicRMWInst::BinOp operation, llvm::Type* kind) {
+    using Operation = llvm::AtomicRMWInst::BinOp;
+    switch (operation) {
+        case Operation::Add:
+        case Operation::Sub:
+        case Operation::And:
+        case Operation::Or:
+        case Operation::Xor:
+        case Operation::Min:
+        case Operation::Max:
+        case Operation::UMin:
+        case Operation::UMax: return kind->isIntegerTy();
+        default: return false;
+    }
+}
+
+}  // namespace
+
 llvm::Value* Emitter::combine(llvm::AtomicRMWInst::BinOp operation, llvm::Value* old, llvm::Value* value) {
     using Operation = llvm::AtomicRMWInst::BinOp;
     const auto pick = [&](llvm::CmpInst::Predicate better) {
@@ -72,8 +93,23 @@ llvm::Value* Emitter::combine_lanes(llvm::AtomicRMWInst::BinOp operation, const 
                                     llvm::Value* lanes_on) {
     using Operation = llvm::AtomicRMWInst::BinOp;
     llvm::Type* kind = value.value->getType()->getScalarType();
-    if (!kind->isIntegerTy()) return nullptr;
     const unsigned bits = kind->getIntegerBitWidth();
+    if (value.is_uniform()) {
+        llvm::Value* count = builder.CreateZExtOrTrunc(
+            builder.CreateUnaryIntrinsic(llvm::Intrinsic::ctpop, mask_bits(lanes_on)), kind);
+        switch (operation) {
+            case Operation::Add:
+            case Operation::Sub: return builder.CreateMul(count, value.value);
+            case Operation::Xor: return builder.CreateMul(builder.CreateAnd(count, 1), value.value);
+            case Operation::Or:
+            case Operation::And:
+            case Operation::Min:
+            case Operation::Max:
+            case Operation::UMin:
+            case Operation::UMax: return value.value;
+            default: break;
+        }
+    }
     // What changes nothing stands in lanes that are off.
     const auto reduce = [&](const llvm::APInt& neutral, llvm::Intrinsic::ID intrinsic) {
         llvm::Value* none = llvm::ConstantInt::get(vector_of(kind), neutral);
@@ -90,7 +126,7 @@ llvm::Value* Emitter::combine_lanes(llvm::AtomicRMWInst::BinOp operation, const 
         case Operation::Max: return reduce(llvm::APInt::getSignedMinValue(bits), llvm::Intrinsic::vector_reduce_smax);
         case Operation::UMin: return reduce(llvm::APInt::getMaxValue(bits), llvm::Intrinsic::vector_reduce_umin);
         case Operation::UMax: return reduce(zero, llvm::Intrinsic::vector_reduce_umax);
-        default: return nullptr;
+        default: reject("an atomic operation is expected in which the order of the lanes makes no difference");
     }
 }
 
@@ -176,18 +212,23 @@ bool Emitter::emit_atomic(const Instruction& at) {
     const auto found_use = frame->shape->uses.find(at.result);
     const bool is_unused = at.result && !trace_table && found_use != frame->shape->uses.end() && !found_use->second.is_used;
     // Where nobody asks for the old values, lanes that mean one place change it once for all of them.
-    if (operation && is_unused && !address->getType()->isVectorTy()) {
-        if (llvm::Value* sum = combine_lanes(*operation, value, lanes_on)) {
+    if (is_unused && operation && can_combine(*operation, kind)) {
+        const auto change_once = [&](llvm::Value* place, llvm::Value* of) {
+            change(place, combine_lanes(*operation, value, of));
+        };
+        if (address->getType()->isVectorTy()) {
+            for_each_different(Component(address), lanes_on, change_once);
+        } else {
             llvm::BasicBlock* change_block = llvm::BasicBlock::Create(context, "change", function_);
             llvm::BasicBlock* after = llvm::BasicBlock::Create(context, "changed", function_);
             builder.CreateCondBr(any(lanes_on), change_block, after);
             builder.SetInsertPoint(change_block);
-            change(address, sum);
+            change_once(address, lanes_on);
             builder.CreateBr(after);
             builder.SetInsertPoint(after);
-            finish(zero(scalar));
-            return true;
         }
+        finish(zero(scalar));
+        return true;
     }
     // One lane after another, as a device with one invocation at a time would.
     llvm::AllocaInst* results = make_slot(vector_of(kind), "atomic");

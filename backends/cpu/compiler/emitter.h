@@ -344,8 +344,7 @@ class Emitter {
                             const std::function<void(llvm::Value*, llvm::Value*)>& body);
     /// What an atomic operation on integers leaves behind.
     llvm::Value* combine(llvm::AtomicRMWInst::BinOp operation, llvm::Value* old, llvm::Value* value);
-    /// The same operation once for all lanes of `lanes_on`, where the order of the lanes makes no difference: the value
-    /// that stands for all of theirs. Null: there is none.
+    /// The value that stands for those of all lanes of `lanes_on` (one at least), where their order makes no difference.
     llvm::Value* combine_lanes(llvm::AtomicRMWInst::BinOp operation, const Component& value, llvm::Value* lanes_on);
     /// Runs `body` for each lane of `mask` in turn.
     void for_each_lane(llvm::Value* mask, const std::function<void(llvm::Value* lane)>& body);
