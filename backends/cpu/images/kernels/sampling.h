@@ -446,6 +446,45 @@ NACRE_INLINE bool sample_plain(const Invocation& call) {
     return is_done;
 }
 
+/// The same for cubes in one level that is filtered linearly, where the footprints of all lanes lie on one face each.
+/// False: they do not, and nothing was done.
+template <int W>
+NACRE_INLINE bool sample_plain_cube(const Invocation& call) {
+    const ImageView& image = *call.image;
+    const rhi::SamplerDesc& sampler = call.sampler->desc;
+    if (image.dimension != rhi::ViewDimension::cube || call.has(image_compare) || call.has(image_integer) ||
+        sampler.magnify != rhi::Filter::linear || sampler.minify != rhi::Filter::linear)
+        return false;
+    std::uint32_t level = 0;
+    if (image.mip_count > 1) {
+        // Levels that are computed from derivatives mostly lie between two.
+        if (!call.has(image_lod_explicit) || call.has(image_min_lod)) return false;
+        const Floats<W> lod = call.floats<W>(call.arguments->lod), bias = splat<W>(sampler.mip_bias);
+        const float first = lod[first_bit(call.live)];
+        if ((mask_bits<W>((lod == first) & (bias == 0.0f)) & call.live) != call.live) return false;
+        const float last = static_cast<float>(image.mip_count - 1);
+        float lambda = first > sampler.min_lod ? first : sampler.min_lod;
+        lambda = lambda < sampler.max_lod ? lambda : sampler.max_lod;
+        lambda = lambda > 0.0f ? lambda : 0.0f;
+        lambda = lambda < last ? lambda : last;
+        level = static_cast<std::uint32_t>(lambda);
+        if (static_cast<float>(level) != lambda) return false;
+    }
+    Source source;
+    if (!make_source(image, level, source)) return false;
+    const Floats<W> direction[3] = {call.floats<W>(call.arguments->coordinates[0]),
+                                    call.floats<W>(call.arguments->coordinates[1]),
+                                    call.floats<W>(call.arguments->coordinates[2])};
+    const CubeProjection<W> cube = project_to_cube<W>(direction);
+    bool is_done = false;
+    Floats<W> out[4];
+    visit_codec(source.codec, [&]<Codec C>() {
+        if constexpr (raw_words<C> != 0) is_done = sample_face<W, C>(source, cube, splat<W>(0), out);
+    });
+    if (is_done) write_result<W>(call, out, mask_of_bits<W>(call.live));
+    return is_done;
+}
+
 /// False where the result of every lane is zero.
 NACRE_INLINE bool can_sample(const Invocation& call) {
     const ImageView& image = *call.image;
@@ -460,7 +499,7 @@ NACRE_INLINE bool can_sample(const Invocation& call) {
 template <int W>
 [[gnu::noinline]] void sample_image(const Invocation& call) {
     if (!can_sample(call)) return write_zeros<W>(call);
-    if (sample_plain<W>(call)) return;
+    if (sample_plain<W>(call) || sample_plain_cube<W>(call)) return;
     const ImageView& image = *call.image;
     const rhi::SamplerDesc& sampler = call.sampler->desc;
     const bool is_integer = call.has(image_integer);
