@@ -279,6 +279,12 @@ struct PlainSampling {
     Ints<W> slice;
     rhi::AddressMode u, v;
     bool is_linear;
+    Ints<W> level;
+    Floats<W> next_weight;
+    /// All lanes read level `first` and none behind it, or all of them the two from there on.
+    bool is_one_level;
+    std::int32_t first;
+    std::uint32_t next_bits;  ///< Lanes that read the level behind their first.
 };
 
 /// The two texels along one axis, without border and offset: as `linear_axis`.
@@ -363,46 +369,49 @@ NACRE_INLINE void sample_plain_level(const PlainSampling<W>& sampling, const Lev
     });
 }
 
-/// False: not all lanes are filtered in the same way, and nothing was done.
-template <int W, Codec C>
-[[gnu::noinline]] bool sample_plain_levels(PlainSampling<W>& sampling) {
+/// False: not all lanes are filtered in the same way.
+template <int W>
+NACRE_INLINE bool choose_levels(PlainSampling<W>& sampling, LevelOfDetail<W>& detail) {
     const Invocation& call = *sampling.call;
     const ImageView& image = *call.image;
     const rhi::SamplerDesc& sampler = call.sampler->desc;
-    const Ints<W> live = mask_of_bits<W>(call.live);
-    LevelOfDetail<W> detail;
-    Ints<W> level = splat<W>(0);
-    Floats<W> next_weight = splat<W>(0.0f);
+    sampling.level = splat<W>(0);
+    sampling.next_weight = splat<W>(0.0f);
     sampling.is_linear = sampler.magnify == rhi::Filter::linear;
     if (image.mip_count > 1 || sampler.magnify != sampler.minify || sampler.max_anisotropy > 1.0f) {
         const Floats<W> coordinates[2] = {sampling.s, sampling.t};
         level_of_detail<W>(call, coordinates, nullptr, 2, detail);
-        select_levels<W>(detail.lambda, image.mip_count, sampler.mip == rhi::Filter::linear, level, next_weight);
+        select_levels<W>(detail.lambda, image.mip_count, sampler.mip == rhi::Filter::linear, sampling.level,
+                         sampling.next_weight);
         if (sampler.magnify != sampler.minify) {
             const std::uint32_t magnified = mask_bits<W>(detail.lambda <= 0.0f) & call.live;
             if (magnified != 0 && magnified != call.live) return false;
             if (magnified == 0) sampling.is_linear = !sampling.is_linear;
         }
     }
-    Floats<W> out[4];
+    sampling.next_bits = mask_bits<W>(sampling.next_weight > 0.0f) & call.live;
+    sampling.first = sampling.level[first_bit(call.live)];
+    sampling.is_one_level = (mask_bits<W>(sampling.level == sampling.first) & call.live) == call.live;
+    return true;
+}
+
+template <int W, Codec C>
+[[gnu::noinline]] void sample_plain_levels(const PlainSampling<W>& sampling, const LevelOfDetail<W>& detail) {
+    const Invocation& call = *sampling.call;
+    const Ints<W> live = mask_of_bits<W>(call.live), level = sampling.level;
+    const Floats<W> next_weight = sampling.next_weight;
     const Ints<W> has_next = next_weight > 0.0f;
-    const std::uint32_t next_bits = mask_bits<W>(has_next) & call.live;
-    const std::int32_t first = level[first_bit(call.live)];
-    const bool is_one_level = (mask_bits<W>(level == first) & call.live) == call.live;
-    sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(first), out);
-    if (is_one_level && next_bits == 0) {
-        write_result<W>(call, out, live);
-        return true;
-    }
-    if (is_one_level) {
+    Floats<W> out[4];
+    if (sampling.is_one_level) {
+        sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(sampling.first), out);
+        if (sampling.next_bits == 0) return write_result<W>(call, out, live);
         Floats<W> next[4];
-        sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(first) + 1, next);
+        sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(sampling.first) + 1, next);
         for (int c = 0; c < 4; ++c) {
             const Floats<W> sum = (splat<W>(0.0f) + out[c] * (1.0f - next_weight)) + next[c] * next_weight;
             out[c] = has_next ? sum : out[c];
         }
-        write_result<W>(call, out, live);
-        return true;
+        return write_result<W>(call, out, live);
     }
     for (int c = 0; c < 4; ++c) out[c] = splat<W>(0.0f);
     add_levels<W>(call, level, next_weight, [&](std::int32_t m, Ints<W> mask, Floats<W> weight) {
@@ -414,7 +423,6 @@ template <int W, Codec C>
         }
     });
     write_result<W>(call, out, live);
-    return true;
 }
 
 /// False: the sample is not plain, and nothing was done.
@@ -439,11 +447,12 @@ NACRE_INLINE bool sample_plain(const Invocation& call) {
     sampling.slice = splat<W>(0);
     if (is_array) sampling.slice = array_layer<W>(call.floats<W>(call.arguments->coordinates[2]), image.layer_count);
     sampling.u = sampler.address_u, sampling.v = sampler.address_v;
-    bool is_done = false;
+    LevelOfDetail<W> detail;
+    if (!choose_levels<W>(sampling, detail)) return false;
     visit_codec(source.codec, [&]<Codec C>() {
-        if constexpr (raw_words<C> != 0) is_done = sample_plain_levels<W, C>(sampling);
+        if constexpr (raw_words<C> != 0) sample_plain_levels<W, C>(sampling, detail);
     });
-    return is_done;
+    return true;
 }
 
 /// The same for cubes in one level that is filtered linearly, where the footprints of all lanes lie on one face each.
