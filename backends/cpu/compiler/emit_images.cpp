@@ -38,7 +38,9 @@ ImageOperands operands_from(const Instruction& at, std::size_t first) {
     return found;
 }
 
-std::uint32_t dimensions_of(spv::Dim dim) {
+}  // namespace
+
+std::uint32_t Emitter::dimensions_of(spv::Dim dim) {
     switch (dim) {
         case spv::Dim::Dim1D:
         case spv::Dim::Buffer: return 1;
@@ -47,8 +49,6 @@ std::uint32_t dimensions_of(spv::Dim dim) {
         default: return 2;
     }
 }
-
-}  // namespace
 
 std::uint32_t Emitter::image_integer_flag(Id image_type) const {
     return module.type(module.type(image_type).element).kind == TypeKind::integer ? std::uint32_t{image_integer} : 0;

@@ -65,7 +65,7 @@ Emitter::TexelPlaces Emitter::texel_places(llvm::Value* view, const Type& type,
         llvm::Value *size, *stride;
     };
     std::vector<Axis> axes{{member(offsetof(ImageLevel, width)), int32(texel_bytes)}};
-    const std::uint32_t dimensions = type.dim == spv::Dim::Dim1D ? 1 : type.dim == spv::Dim::Dim3D ? 3 : 2;
+    const std::uint32_t dimensions = dimensions_of(type.dim);
     if (dimensions > 1)
         axes.push_back({member(offsetof(ImageLevel, height)), member(offsetof(ImageLevel, row_stride))});
     if (dimensions > 2)
@@ -116,9 +116,7 @@ std::vector<Component> Emitter::fetch_directly(const Component& image, Id image_
     llvm::Value* none = llvm::Constant::getNullValue(words);
     llvm::Value* view = bound_view(image.value);
     const bool is_integer = image_integer_flag(image_type) != 0;
-    const std::uint32_t count =
-        (type.dim == spv::Dim::Dim1D ? 1u : type.dim == spv::Dim::Dim3D ? 3u : 2u) + (type.arrayed ? 1u : 0u);
-    const bool is_row = are_rows(coordinates, count);
+    const bool is_row = are_rows(coordinates, dimensions_of(type.dim) + (type.arrayed ? 1u : 0u));
     llvm::Value* layout = invariant_load(word, at_offset(view, offsetof(ImageView, direct_texels)), 4);
     llvm::Value* mips = invariant_load(word, at_offset(view, offsetof(ImageView, mip_count)), 4);
     llvm::Value* known = select(builder.CreateICmpULT(level.value, mips), layout, int32(0));
@@ -203,9 +201,7 @@ std::vector<Component> Emitter::fetch_directly(const Component& image, Id image_
 bool Emitter::store_directly(const Component& image, Id image_type, const std::vector<Component>& coordinates,
                              const std::vector<Component>& texel, const std::function<void()>& otherwise) {
     const Type& type = module.type(image_type);
-    const std::uint32_t count =
-        (type.dim == spv::Dim::Dim1D ? 1u : type.dim == spv::Dim::Dim3D ? 3u : 2u) + (type.arrayed ? 1u : 0u);
-    if (!are_rows(coordinates, count) || texel.size() < 4) return false;
+    if (!are_rows(coordinates, dimensions_of(type.dim) + (type.arrayed ? 1u : 0u)) || texel.size() < 4) return false;
     const bool is_integer = image_integer_flag(image_type) != 0;
     llvm::Type* word = builder.getInt32Ty();
     llvm::Type* words = vector_of(word);

@@ -269,6 +269,8 @@ class Emitter {
     llvm::Value* image_memory();                                        ///< An ImageArguments on the stack.
     void set_image_atomic(AtomicOperation operation, const Component& comparator);
     [[nodiscard]] std::uint32_t image_integer_flag(Id image_type) const;
+    /// Coordinates without the layer.
+    [[nodiscard]] static std::uint32_t dimensions_of(spv::Dim dim);
     Component from_word(const Component& word, llvm::Type* kind);       ///< Bits of 32 as a value of a type.
     Component to_word(const Component& value);
     // Texels without a call (emit_texels.cpp); `otherwise` makes the call for what has another layout.
