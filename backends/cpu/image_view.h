@@ -30,8 +30,14 @@ struct ImageLevel {
     double* shadow = nullptr;
 };
 
-/// Views whose texels compiled code fetches by itself: one sample, one channel of 32 bits, offsets below 2^31 bytes.
-enum class WordTexels : std::uint32_t { no, floating, integer };
+/// Views whose texels compiled code reads and writes by itself, by their layout: one sample, offsets below 2^31 bytes.
+enum class DirectTexels : std::uint32_t {
+    no,
+    float_word,    ///< r32_float, depth of 32 bits.
+    integer_word,  ///< r32_uint, r32_sint
+    half4,         ///< rgba16_float
+    unorm8x4,      ///< rgba8_unorm
+};
 
 /// A part of a texture in one dimension and format. Levels count from the view's first mip, layers from its first layer.
 struct ImageView {
@@ -41,7 +47,7 @@ struct ImageView {
     std::uint32_t layer_count = 0;   ///< Cubes: 6 for each cube. 3D: 1.
     std::uint32_t samples = 1;
     std::uint32_t texel_bytes = 0;   ///< Of a texel, or of a block.
-    WordTexels word_texels = WordTexels::no;
+    DirectTexels direct_texels = DirectTexels::no;
     std::array<ImageLevel, max_mips> levels{};
     std::array<ImageLevel, max_mips> stencil_levels{};
 };

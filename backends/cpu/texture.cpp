@@ -11,6 +11,19 @@
 namespace nacre::cpu {
 namespace {
 
+DirectTexels direct_texels(rhi::Format format) {
+    switch (format) {
+        case rhi::Format::r32_float:
+        case rhi::Format::d32_float:
+        case rhi::Format::d32_float_s8_uint: return DirectTexels::float_word;
+        case rhi::Format::r32_uint:
+        case rhi::Format::r32_sint: return DirectTexels::integer_word;
+        case rhi::Format::rgba16_float: return DirectTexels::half4;
+        case rhi::Format::rgba8_unorm: return DirectTexels::unorm8x4;
+        default: return DirectTexels::no;
+    }
+}
+
 /// Lays out one plane from byte `start` on and returns where it ends. `data` holds offsets until there is memory.
 std::uint64_t lay_out(std::array<ImageLevel, max_mips>& levels, std::array<std::uint64_t, max_mips>& offsets,
                       const rhi::TextureDesc& desc, std::uint32_t texel_bytes, std::uint32_t block_width,
@@ -121,14 +134,10 @@ ImageView CpuTexture::make_view(const rhi::ViewReference& reference) const {
         view.levels[mip] = part(whole_.levels[reference.base_mip + mip]);
         view.stencil_levels[mip] = part(whole_.stencil_levels[reference.base_mip + mip]);
     }
-    const bool is_integer = view.format == rhi::Format::r32_uint || view.format == rhi::Format::r32_sint;
-    const bool is_float = view.format == rhi::Format::r32_float || view.format == rhi::Format::d32_float ||
-                          view.format == rhi::Format::d32_float_s8_uint;
     const ImageLevel& first = view.levels[0];
     const std::uint64_t bytes = first.layer_stride * view.layer_count + first.slice_stride * first.depth +
                                 std::uint64_t{first.row_stride} * first.height;
-    if ((is_integer || is_float) && view.samples == 1 && bytes < (std::uint64_t{1} << 31))
-        view.word_texels = is_integer ? WordTexels::integer : WordTexels::floating;
+    if (view.samples == 1 && bytes < (std::uint64_t{1} << 31)) view.direct_texels = direct_texels(view.format);
     return view;
 }
 

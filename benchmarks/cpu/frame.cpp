@@ -44,15 +44,20 @@ Expected<void> run_scene(Bench& bench, const std::string& name, const std::strin
         NACRE_TRY(auto rendering, start(bench, cpu_spec(lanes), scene));
         work.cpu.push_back(side_of("cpu", lanes, std::move(rendering)));
     }
-    NACRE_TRY(auto rendering, start(bench, "vulkan", scene));
-    work.references.push_back(side_of("vulkan", 0, std::move(rendering)));
+    for (const std::string reference : {"vulkan", "gl"}) {
+        if (!bench.has_device(reference)) continue;
+        NACRE_TRY(auto rendering, start(bench, reference, scene));
+        work.references.push_back(side_of(reference, 0, std::move(rendering)));
+    }
     return bench.measure(std::move(work));
 }
 
 }  // namespace
 
 Expected<void> run_frame(Bench& bench) {
-    if (!bench.has_device("vulkan")) return {};
+    // Both are asked, so that both are reported where they are absent.
+    const bool has_vulkan = bench.has_device("vulkan"), has_gl = bench.has_device("gl");
+    if (!has_vulkan && !has_gl) return {};
     std::vector<std::pair<std::string, std::string>> scenes;  // name, what to load
     for (const std::string_view name : scene::builtin_scene_names())
         scenes.emplace_back(name.substr(name.find(':') + 1), name);

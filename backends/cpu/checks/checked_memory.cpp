@@ -102,7 +102,7 @@ std::shared_ptr<const UndefinedTexels> CheckedMemory::undefined_texels(const Ima
         made->view = view;
         made->view.format = rhi::Format::r32_float;
         made->view.texel_bytes = 4;
-        made->view.word_texels = WordTexels::no;
+        made->view.direct_texels = DirectTexels::no;
         made->view.stencil_levels = {};
         std::uint64_t total = 0;
         for (std::uint32_t mip = 0; mip < view.mip_count; ++mip) {

@@ -86,6 +86,10 @@ void ComputeEmitter::emit_subgroup_body(llvm::Value* subgroup) {
         local_id[2] = size[2] == 1 ? Component(int32(0)) : Component(builder.CreateUDiv(row, split(row, size[1])));
         if (size[1] == 1 && size[2] == 1) local_id[0] = index;
     }
+    if (size[0] % row_lanes() == 0) {
+        row_shapes[local_id[0].value] = RowShape::rising;
+        for (const std::size_t axis : {1, 2}) row_shapes[local_id[axis].value] = RowShape::equal;
+    }
     mask = all_lanes();
     if (total % lanes != 0) mask = builder.CreateICmpULT(index.value, splat(int32(total)));
     llvm::Value* const entry_mask = mask;

@@ -48,6 +48,88 @@ void Emitter::for_each_different(const Component& address, llvm::Value* lanes_on
     builder.SetInsertPoint(after);
 }
 
+namespace {
+
+/// Whether the order of the lanes makes no difference to what an operation leaves behind.
+bool can_combine(llvm::AtomicRMWInst::BinOp operation, llvm::Type* kind) {
+    using Operation = llvm::AtomicRMWInst::BinOp;
+    switch (operation) {
+        case Operation::Add:
+        case Operation::Sub:
+        case Operation::And:
+        case Operation::Or:
+        case Operation::Xor:
+        case Operation::Min:
+        case Operation::Max:
+        case Operation::UMin:
+        case Operation::UMax: return kind->isIntegerTy();
+        default: return false;
+    }
+}
+
+}  // namespace
+
+llvm::Value* Emitter::combine(llvm::AtomicRMWInst::BinOp operation, llvm::Value* old, llvm::Value* value) {
+    using Operation = llvm::AtomicRMWInst::BinOp;
+    const auto pick = [&](llvm::CmpInst::Predicate better) {
+        return builder.CreateSelect(builder.CreateICmp(better, old, value), old, value);
+    };
+    switch (operation) {
+        case Operation::Xchg: return value;
+        case Operation::Add: return builder.CreateAdd(old, value);
+        case Operation::Sub: return builder.CreateSub(old, value);
+        case Operation::And: return builder.CreateAnd(old, value);
+        case Operation::Or: return builder.CreateOr(old, value);
+        case Operation::Xor: return builder.CreateXor(old, value);
+        case Operation::Min: return pick(llvm::CmpInst::ICMP_SLT);
+        case Operation::Max: return pick(llvm::CmpInst::ICMP_SGT);
+        case Operation::UMin: return pick(llvm::CmpInst::ICMP_ULT);
+        case Operation::UMax: return pick(llvm::CmpInst::ICMP_UGT);
+        default: reject("an atomic operation on integers is expected and another one is found");
+    }
+}
+
+llvm::Value* Emitter::combine_lanes(llvm::AtomicRMWInst::BinOp operation, const Component& value,
+                                    llvm::Value* lanes_on) {
+    using Operation = llvm::AtomicRMWInst::BinOp;
+    llvm::Type* kind = value.value->getType()->getScalarType();
+    const unsigned bits = kind->getIntegerBitWidth();
+    if (value.is_uniform()) {
+        llvm::Value* count = builder.CreateZExtOrTrunc(
+            builder.CreateUnaryIntrinsic(llvm::Intrinsic::ctpop, mask_bits(lanes_on)), kind);
+        switch (operation) {
+            case Operation::Add:
+            case Operation::Sub: return builder.CreateMul(count, value.value);
+            case Operation::Xor: return builder.CreateMul(builder.CreateAnd(count, 1), value.value);
+            case Operation::Or:
+            case Operation::And:
+            case Operation::Min:
+            case Operation::Max:
+            case Operation::UMin:
+            case Operation::UMax: return value.value;
+            default: break;
+        }
+    }
+    // What changes nothing stands in lanes that are off.
+    const auto reduce = [&](const llvm::APInt& neutral, llvm::Intrinsic::ID intrinsic) {
+        llvm::Value* none = llvm::ConstantInt::get(vector_of(kind), neutral);
+        return builder.CreateIntrinsic(kind, intrinsic, {select(lanes_on, widen(value), none)});
+    };
+    const llvm::APInt zero(bits, 0);
+    switch (operation) {
+        case Operation::Add:
+        case Operation::Sub: return reduce(zero, llvm::Intrinsic::vector_reduce_add);
+        case Operation::Or: return reduce(zero, llvm::Intrinsic::vector_reduce_or);
+        case Operation::Xor: return reduce(zero, llvm::Intrinsic::vector_reduce_xor);
+        case Operation::And: return reduce(llvm::APInt::getAllOnes(bits), llvm::Intrinsic::vector_reduce_and);
+        case Operation::Min: return reduce(llvm::APInt::getSignedMaxValue(bits), llvm::Intrinsic::vector_reduce_smin);
+        case Operation::Max: return reduce(llvm::APInt::getSignedMinValue(bits), llvm::Intrinsic::vector_reduce_smax);
+        case Operation::UMin: return reduce(llvm::APInt::getMaxValue(bits), llvm::Intrinsic::vector_reduce_umin);
+        case Operation::UMax: return reduce(zero, llvm::Intrinsic::vector_reduce_umax);
+        default: reject("an atomic operation is expected in which the order of the lanes makes no difference");
+    }
+}
+
 bool Emitter::emit_atomic(const Instruction& at) {
     using Operation = llvm::AtomicRMWInst::BinOp;
     std::optional<Operation> operation;
@@ -118,6 +200,36 @@ bool Emitter::emit_atomic(const Instruction& at) {
     llvm::Value* lanes_on = both(is_load ? mask : effect_mask(), ok ? ok.value : nullptr);
     llvm::Value* address = addresses(pointer, 0);
     const llvm::Align alignment(scalar.bits / 8);
+    // All invocations of a workgroup run on one thread, one subgroup after another.
+    const bool is_own = pointer.storage == spv::StorageClass::Workgroup && operation && scalar.kind == TypeKind::integer;
+    const auto change = [&](llvm::Value* place, llvm::Value* by) -> llvm::Value* {
+        if (!is_own)
+            return builder.CreateAtomicRMW(*operation, place, by, alignment, llvm::AtomicOrdering::SequentiallyConsistent);
+        llvm::Value* old = builder.CreateAlignedLoad(kind, place, alignment);
+        builder.CreateAlignedStore(combine(*operation, old, by), place, alignment);
+        return old;
+    };
+    const auto found_use = frame->shape->uses.find(at.result);
+    const bool is_unused = at.result && !trace_table && found_use != frame->shape->uses.end() && !found_use->second.is_used;
+    // Where nobody asks for the old values, lanes that mean one place change it once for all of them.
+    if (is_unused && operation && can_combine(*operation, kind)) {
+        const auto change_once = [&](llvm::Value* place, llvm::Value* of) {
+            change(place, combine_lanes(*operation, value, of));
+        };
+        if (address->getType()->isVectorTy()) {
+            for_each_different(Component(address), lanes_on, change_once);
+        } else {
+            llvm::BasicBlock* change_block = llvm::BasicBlock::Create(context, "change", function_);
+            llvm::BasicBlock* after = llvm::BasicBlock::Create(context, "changed", function_);
+            builder.CreateCondBr(any(lanes_on), change_block, after);
+            builder.SetInsertPoint(change_block);
+            change_once(address, lanes_on);
+            builder.CreateBr(after);
+            builder.SetInsertPoint(after);
+        }
+        finish(zero(scalar));
+        return true;
+    }
     // One lane after another, as a device with one invocation at a time would.
     llvm::AllocaInst* results = make_slot(vector_of(kind), "atomic");
     builder.CreateStore(llvm::Constant::getNullValue(vector_of(kind)), results);
@@ -138,9 +250,9 @@ bool Emitter::emit_atomic(const Instruction& at) {
                                                             llvm::AtomicOrdering::SequentiallyConsistent);
             old = builder.CreateExtractValue(pair, 0);
         } else {
-            old = builder.CreateAtomicRMW(*operation, place, of_lane(value.value), alignment, llvm::AtomicOrdering::SequentiallyConsistent);
+            old = change(place, of_lane(value.value));
         }
-        if (old) {
+        if (old && !is_unused) {
             llvm::Value* all = builder.CreateLoad(vector_of(kind), results);
             builder.CreateStore(builder.CreateInsertElement(all, old, lane), results);
         }

@@ -92,7 +92,9 @@ void Emitter::find_uses(const Function& function, Shape& shape) const {
     }
     const auto use = [&](Id id, std::uint32_t block) {
         const auto found = shape.uses.find(id);
-        if (found == shape.uses.end() || found->second.home == block) return;
+        if (found == shape.uses.end()) return;
+        found->second.is_used = true;
+        if (found->second.home == block) return;
         found->second.last = std::max(found->second.last, block);
         const std::uint32_t loop = shape.blocks[found->second.home].divergent_loop;
         if (loop != ~0u && (block < loop || block >= shape.blocks[loop].end)) found->second.is_leaving = true;
@@ -145,6 +147,9 @@ void Emitter::merge(std::size_t first_change, llvm::BasicBlock* skipped, llvm::B
             either->addIncoming(now, ran);
             either->addIncoming(before, skipped);
             *change.place = either;
+            // Behind code that was skipped nobody reads the value.
+            if (llvm::isa<llvm::UndefValue>(before) && now->getType()->isIntOrIntVectorTy(32))
+                if (const RowShape shape = row_shape(now); shape != RowShape::other) row_shapes[either] = shape;
         }
         changes[kept++] = change;
     }

@@ -38,7 +38,9 @@ ImageOperands operands_from(const Instruction& at, std::size_t first) {
     return found;
 }
 
-std::uint32_t dimensions_of(spv::Dim dim) {
+}  // namespace
+
+std::uint32_t Emitter::dimensions_of(spv::Dim dim) {
     switch (dim) {
         case spv::Dim::Dim1D:
         case spv::Dim::Buffer: return 1;
@@ -47,8 +49,6 @@ std::uint32_t dimensions_of(spv::Dim dim) {
         default: return 2;
     }
 }
-
-}  // namespace
 
 std::uint32_t Emitter::image_integer_flag(Id image_type) const {
     return module.type(module.type(image_type).element).kind == TypeKind::integer ? std::uint32_t{image_integer} : 0;
@@ -172,80 +172,6 @@ llvm::Value* Emitter::bound_view(llvm::Value* descriptor_address) {
                                          llvm::Constant::getNullValue(bytes), "no_view");
     }
     return select(builder.CreateICmpNE(view, llvm::ConstantPointerNull::get(pointer_type)), view, empty);
-}
-
-/// texelFetch of views of single words, the hottest of all operations, without a call; `otherwise` makes the call for
-/// others.
-std::vector<Component> Emitter::fetch_words(const Component& image, Id image_type,
-                                            const std::vector<Component>& coordinates, const Component& level,
-                                            const std::function<std::vector<Component>()>& otherwise) {
-    const Type& type = module.type(image_type);
-    llvm::Type* word = builder.getInt32Ty();
-    llvm::Value* view = bound_view(image.value);
-    const bool is_integer = image_integer_flag(image_type) != 0;
-    const auto wanted = static_cast<std::int32_t>(is_integer ? WordTexels::integer : WordTexels::floating);
-    llvm::Value* kind = invariant_load(word, at_offset(view, offsetof(ImageView, word_texels)), 4);
-    llvm::Value* mips = invariant_load(word, at_offset(view, offsetof(ImageView, mip_count)), 4);
-    llvm::Value* is_direct =
-        builder.CreateAnd(builder.CreateICmpEQ(kind, int32(wanted)), builder.CreateICmpULT(level.value, mips));
-    llvm::BasicBlock* direct = llvm::BasicBlock::Create(context, "fetch_words", function_);
-    llvm::BasicBlock* call = llvm::BasicBlock::Create(context, "fetch_call", function_);
-    llvm::BasicBlock* after = llvm::BasicBlock::Create(context, "fetched", function_);
-    builder.CreateCondBr(is_direct, direct, call);
-
-    builder.SetInsertPoint(direct);
-    llvm::Value* levels = at_offset(view, offsetof(ImageView, levels));
-    llvm::Value* mip = builder.CreateGEP(
-        builder.getInt8Ty(), levels,
-        builder.CreateMul(builder.CreateZExt(level.value, builder.getInt64Ty()), int64(sizeof(ImageLevel))));
-    const auto member = [&](std::size_t offset) {
-        return invariant_load(word, at_offset(mip, static_cast<std::int64_t>(offset)), 4);
-    };
-    // Strides of views that are read here fit into 32 bits: their lower halves.
-    static_assert(std::endian::native == std::endian::little);
-    struct Axis {
-        llvm::Value *size, *stride;
-    };
-    std::vector<Axis> axes{{member(offsetof(ImageLevel, width)), int32(4)}};
-    const std::uint32_t dimensions = dimensions_of(type.dim);
-    if (dimensions > 1)
-        axes.push_back({member(offsetof(ImageLevel, height)), member(offsetof(ImageLevel, row_stride))});
-    if (dimensions > 2)
-        axes.push_back({member(offsetof(ImageLevel, depth)), member(offsetof(ImageLevel, slice_stride))});
-    if (type.arrayed)
-        axes.push_back({invariant_load(word, at_offset(view, offsetof(ImageView, layer_count)), 4),
-                        member(offsetof(ImageLevel, layer_stride))});
-    llvm::Value *inside = mask, *offset = nullptr;
-    for (std::size_t i = 0; i < axes.size(); ++i) {
-        llvm::Value* at = widen(coordinates.at(i));
-        inside = both(inside, builder.CreateICmpULT(at, splat(axes[i].size)));
-        llvm::Value* step = builder.CreateMul(at, splat(axes[i].stride));
-        offset = offset ? builder.CreateAdd(offset, step) : step;
-    }
-    llvm::Value* data = invariant_load(pointer_type, at_offset(mip, offsetof(ImageLevel, data)), 8);
-    llvm::Type* words = vector_of(word);
-    llvm::Value* none = llvm::Constant::getNullValue(words);
-    llvm::Value* texels = builder.CreateMaskedGather(words, builder.CreateGEP(builder.getInt8Ty(), data, offset),
-                                                     llvm::Align(4), inside, none);
-    llvm::Value* one = splat(int32(is_integer ? 1 : std::bit_cast<std::int32_t>(1.0f)));
-    llvm::Value* alpha = select(inside, one, none);
-    llvm::BasicBlock* direct_end = builder.GetInsertBlock();
-    builder.CreateBr(after);
-
-    builder.SetInsertPoint(call);
-    const std::vector<Component> called = otherwise();
-    llvm::BasicBlock* call_end = builder.GetInsertBlock();
-    builder.CreateBr(after);
-
-    builder.SetInsertPoint(after);
-    std::vector<Component> result;
-    for (std::size_t i = 0; i < 4; ++i) {
-        llvm::PHINode* either = builder.CreatePHI(words, 2);
-        either->addIncoming(i == 0 ? texels : i == 3 ? alpha : none, direct_end);
-        either->addIncoming(called.at(i).value, call_end);
-        result.emplace_back(either);
-    }
-    return result;
 }
 
 bool Emitter::emit_image(const Instruction& at) {
@@ -409,12 +335,18 @@ bool Emitter::emit_image(const Instruction& at) {
                           flags, texel, sample);
     };
     if (is_implicit && has_quads && looks_for(check_sanitize)) check_quads();
-    const bool may_be_words = !options.checks && operation == ImageOperation::fetch && image.image.is_uniform() && level.is_uniform() &&
-                              !more.offset && !type.multisampled && type.dim != spv::Dim::Cube &&
-                              level.value->getType()->isIntegerTy(32) &&
-                              coordinates.at(0).value->getType()->getScalarType()->isIntegerTy(32);
+    const bool is_texel = operation == ImageOperation::fetch || operation == ImageOperation::load ||
+                          operation == ImageOperation::store;
+    const bool may_be_direct = !options.checks && is_texel && image.image.is_uniform() && level.is_uniform() &&
+                               !more.offset && !type.multisampled && type.dim != spv::Dim::Cube &&
+                               level.value->getType()->isIntegerTy(32) &&
+                               coordinates.at(0).value->getType()->getScalarType()->isIntegerTy(32);
+    if (operation == ImageOperation::store) {
+        if (!may_be_direct || !store_directly(image.image, image.image_type, coordinates, texel, [&] { call(); })) call();
+        return true;
+    }
     const std::vector<Component> words =
-        may_be_words ? fetch_words(image.image, image.image_type, coordinates, level, call) : call();
+        may_be_direct ? fetch_directly(image.image, image.image_type, coordinates, level, call) : call();
     if (at.result) set(at, make_texel(words, at.type));
     return true;
 }

@@ -265,14 +265,36 @@ class Emitter {
     /// The instruction on doubles, for images of floats.
     void emit_double_image(const Instruction& at, const ImageAccess& access);
     llvm::Value* bound_view(llvm::Value* descriptor_address);           ///< ptr to ImageView; to zeros where nothing is bound.
-    std::vector<Component> fetch_words(const Component& image, Id image_type, const std::vector<Component>& coordinates,
-                                       const Component& level, const std::function<std::vector<Component>()>& otherwise);
     void put_argument(std::size_t offset, const Component& value);
     llvm::Value* image_memory();                                        ///< An ImageArguments on the stack.
     void set_image_atomic(AtomicOperation operation, const Component& comparator);
     [[nodiscard]] std::uint32_t image_integer_flag(Id image_type) const;
+    /// Coordinates without the layer.
+    [[nodiscard]] static std::uint32_t dimensions_of(spv::Dim dim);
     Component from_word(const Component& word, llvm::Type* kind);       ///< Bits of 32 as a value of a type.
     Component to_word(const Component& value);
+    // Texels without a call (emit_texels.cpp); `otherwise` makes the call for what has another layout.
+    std::vector<Component> fetch_directly(const Component& image, Id image_type,
+                                          const std::vector<Component>& coordinates, const Component& level,
+                                          const std::function<std::vector<Component>()>& otherwise);
+    /// False: nothing was emitted.
+    bool store_directly(const Component& image, Id image_type, const std::vector<Component>& coordinates,
+                        const std::vector<Component>& texel, const std::function<void()>& otherwise);
+    /// What a value does from lane to lane inside of a row of `row_lanes` lanes.
+    enum class RowShape : std::uint8_t { other, equal, rising };  ///< rising: by one.
+    [[nodiscard]] RowShape row_shape(llvm::Value* value, std::uint32_t depth = 0) const;
+    /// Whether the first `count` coordinates mean texels side by side in every row of lanes.
+    [[nodiscard]] bool are_rows(const std::vector<Component>& coordinates, std::size_t count) const;
+    [[nodiscard]] std::uint32_t row_lanes() const;
+    struct TexelPlaces {
+        llvm::Value *data = nullptr, *offset = nullptr;  ///< ptr; bytes from there.
+        llvm::Value* inside = nullptr;                   ///< Lanes of the mask whose texel exists.
+    };
+    TexelPlaces texel_places(llvm::Value* view, const Type& image_type, const std::vector<Component>& coordinates,
+                             llvm::Value* level, std::uint32_t texel_bytes);
+    llvm::Value* row_address(const TexelPlaces& places, std::uint32_t first_lane_of_row);
+    llvm::Value* load_texel_rows(const TexelPlaces& places, llvm::Type* element, std::uint32_t per_texel);
+    std::unordered_map<const llvm::Value*, RowShape> row_shapes;  ///< Of what the stage brings.
     bool emit_ray(const Instruction& at);                               // emit_rays.cpp
     /// Whether a type is a ray query or an array of them.
     [[nodiscard]] bool is_ray_query(Id type) const;
@@ -322,6 +344,10 @@ class Emitter {
     /// Runs `body` for each different address in the lanes of `mask`: once where it is uniform.
     void for_each_different(const Component& address, llvm::Value* mask,
                             const std::function<void(llvm::Value*, llvm::Value*)>& body);
+    /// What an atomic operation on integers leaves behind.
+    llvm::Value* combine(llvm::AtomicRMWInst::BinOp operation, llvm::Value* old, llvm::Value* value);
+    /// The value that stands for those of all lanes of `lanes_on` (one at least), where their order makes no difference.
+    llvm::Value* combine_lanes(llvm::AtomicRMWInst::BinOp operation, const Component& value, llvm::Value* lanes_on);
     /// Runs `body` for each lane of `mask` in turn.
     void for_each_lane(llvm::Value* mask, const std::function<void(llvm::Value* lane)>& body);
 
@@ -456,6 +482,7 @@ class Emitter {
             std::uint32_t last = 0;              ///< Last block that uses it.
             bool is_leaving = false;             ///< Used behind a loop that lanes leave one by one, made inside.
             bool is_remade = false;              ///< A pointer or image: behind such loops made again from its operands.
+            bool is_used = false;                ///< Somewhere at all.
         };
         std::vector<BlockShape> blocks;
         std::unordered_map<Id, Use> uses;

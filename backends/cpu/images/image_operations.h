@@ -21,6 +21,7 @@
 
 namespace nacre::cpu {
 
+/// avx512: with VBMI, as in Ice Lake and Zen 4 and what came after; older processors take avx2.
 enum class InstructionSet : std::uint8_t { baseline, avx2, avx512 };
 
 /// The fastest that this machine has.

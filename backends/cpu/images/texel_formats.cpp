@@ -108,10 +108,16 @@ double srgb_to_linear(double code) { return code <= 0.04045 ? code / 12.92 : std
 
 struct SrgbTables {
     std::array<float, 256> linear{};
+    // Byte k of linear[i] at 256 * k + i.
+    alignas(64) std::array<std::byte, 1024> linear_bytes{};
     // thresholds[k]: smallest float whose nearest code is above k.
     std::array<float, 255> thresholds{};
     SrgbTables() {
-        for (int code = 0; code < 256; ++code) linear[code] = static_cast<float>(srgb_to_linear(code / 255.0));
+        for (std::uint32_t code = 0; code < 256; ++code) {
+            linear[code] = static_cast<float>(srgb_to_linear(code / 255.0));
+            const auto bits = std::bit_cast<std::uint32_t>(linear[code]);
+            for (std::uint32_t k = 0; k < 4; ++k) linear_bytes[256 * k + code] = std::byte(bits >> (8 * k));
+        }
         for (int code = 0; code < 255; ++code) {
             const double exact = srgb_to_linear((code + 0.5) / 255.0);
             auto rounded = static_cast<float>(exact);
@@ -291,6 +297,7 @@ std::uint16_t float_to_half(float value) {
 }
 
 const float* srgb_to_linear_table() { return srgb_tables().linear.data(); }
+const std::byte* srgb_to_linear_bytes() { return srgb_tables().linear_bytes.data(); }
 
 std::uint8_t linear_to_srgb(float linear) {
     if (!(linear > 0.0f)) return 0;

@@ -40,6 +40,8 @@ void encode_texel(rhi::Format format, const Texel& texel, std::byte* out);
 
 /// Linear value of an 8-bit sRGB code: 256 floats. Source: IEC 61966-2-1.
 const float* srgb_to_linear_table();
+/// The same by bytes, lowest first: byte k of the float of a code at 256 * k + code. Aligned to 64.
+const std::byte* srgb_to_linear_bytes();
 
 /// Nearest 8-bit sRGB code of a linear value; NaN gives 0.
 std::uint8_t linear_to_srgb(float linear);

@@ -51,7 +51,9 @@ void find_unique(ChunkScratch& scratch) {
                 entry = {index, static_cast<std::uint32_t>(scratch.indices.size()), scratch.generation};
                 scratch.indices.push_back(index);
             } else if (entry.index != index) {
-                place = (place + 1) & mask;
+                // Away by a step of its own (odd, so that it comes everywhere): meshes that take turns between several
+                // runs of neighbors would go along one run for every vertex of another.
+                place = (place + ((index * 0x9e3779b1u >> 15) | 1)) & mask;
                 continue;
             }
             local = entry.local;

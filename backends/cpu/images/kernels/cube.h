@@ -38,7 +38,18 @@ NACRE_INLINE CubeProjection<W> project_to_cube(const Floats<W>* direction) {
     const Floats<W> along = is_z ? direction[2] : (is_y ? direction[1] : direction[0]);
     CubeProjection<W> cube;
     cube.face = axis + ((along < 0.0f) & 1);
-    face_components<W>(cube.face, direction, cube.sc, cube.tc, cube.major);
+    const std::int32_t first = cube.face[0];
+    if (mask_bits<W>(cube.face == first) == all_lanes<W>) {
+        // Neighbors mostly see one face.
+        const auto signed_by = [](Floats<W> x, std::int32_t sign) { return (Floats<W>)((Ints<W>)x ^ sign); };
+        constexpr auto minus = static_cast<std::int32_t>(0x80000000u);
+        const std::int32_t outward = (first & 1) != 0 ? minus : 0;
+        cube.major = absolute<W>(along);
+        cube.sc = first < 2 ? signed_by(direction[2], minus ^ outward) : signed_by(direction[0], first > 3 ? outward : 0);
+        cube.tc = first < 2 || first > 3 ? signed_by(direction[1], minus) : signed_by(direction[2], outward);
+    } else {
+        face_components<W>(cube.face, direction, cube.sc, cube.tc, cube.major);
+    }
     cube.s = 0.5f * (cube.sc / cube.major) + 0.5f;
     cube.t = 0.5f * (cube.tc / cube.major) + 0.5f;
     return cube;

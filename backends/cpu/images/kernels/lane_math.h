@@ -91,9 +91,12 @@ template <int W>
 NACRE_INLINE Ints<W> truncate(Floats<W> x) {
     return __builtin_convertvector(x, Ints<W>);
 }
-/// |x| < 2^31.
+/// |x| < 2^31; a zero has any sign.
 template <int W>
 NACRE_INLINE Floats<W> floor_small(Floats<W> x) {
+#ifdef NACRE_NATIVE_FLOOR
+    return floor_natively<W>(x);
+#endif
     const Floats<W> whole = to_floats<W>(truncate<W>(x));
     return whole - (whole > x ? splat<W>(1.0f) : splat<W>(0.0f));
 }
@@ -106,6 +109,9 @@ NACRE_INLINE Floats<W> round_small(Floats<W> x) {
 /// up.
 template <int W>
 NACRE_INLINE Floats<W> fraction(Floats<W> x) {
+#ifdef NACRE_NATIVE_FLOOR
+    return maximum<W>(x - floor_natively<W>(x), splat<W>(0.0f));
+#endif
     const Ints<W> has_fraction = absolute<W>(x) < 8388608.0f;
     const Floats<W> small = has_fraction ? x : splat<W>(0.0f);
     return small - floor_small<W>(small);

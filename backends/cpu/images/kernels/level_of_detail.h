@@ -25,7 +25,7 @@ struct LevelOfDetail {
 /// @param coordinates  as the shader gave them (for cubes, directions)
 /// @param cube         for cubes, else null
 template <int W>
-[[gnu::noinline]] void level_of_detail(const Invocation& call, const Floats<W>* coordinates,
+NACRE_INLINE void level_of_detail(const Invocation& call, const Floats<W>* coordinates,
                                        const CubeProjection<W>* cube, int spatial, LevelOfDetail<W>& result) {
     const rhi::SamplerDesc& sampler = call.sampler->desc;
     const ImageArguments& arguments = *call.arguments;

@@ -21,7 +21,12 @@ template <int W, Codec C>
     Floats<W> sum[4] = {};
     for (int first = 0; first < taps.count; first += 2) {
         Floats<W> texels[2][4];
-        load_two_raw<W, C>(source, taps.places[first], taps.places[first + 1], texels);
+        bool are_neighbors = false;
+        if constexpr (raw_words<C> != 0) {
+            const Ints<W> behind = taps.places[first].offset + 4 * raw_words<C>;
+            are_neighbors = mask_bits<W>(taps.places[first + 1].offset == behind) == all_lanes<W>;
+        }
+        load_two_raw<W, C>(source, taps.places[first], taps.places[first + 1], are_neighbors, texels);
         for (int i = 0; i < 2; ++i) {
             const int tap = first + i;
             Floats<W>* const texel = texels[i];
@@ -126,26 +131,33 @@ NACRE_INLINE void footprint(const Sampling<W>& sampling, const Source& source, c
                  {sampler.address_u, sampler.address_v, sampler.address_w}, offset, taps);
 }
 
+/// Adds two texels of a footprint, with their weights.
+template <int W, Codec C>
+NACRE_INLINE void add_two_texels(const Source& source, const Place<W>& first, const Place<W>& second,
+                                 bool are_neighbors, Floats<W> first_weight, Floats<W> second_weight, Floats<W>* sum) {
+    Floats<W> texels[2][4];
+    load_two_raw<W, C>(source, first, second, are_neighbors, texels);
+    const int channels = raw_channels<C>(*source.plan);
+    for (int c = 0; c < channels; ++c) sum[c] = sum[c] + first_weight * texels[0][c];
+    for (int c = 0; c < channels; ++c) sum[c] = sum[c] + second_weight * texels[1][c];
+}
+
 /// A linear sample of a cube whose footprint lies on one face in all lanes. False: it does not, and nothing was done.
 template <int W, Codec C>
 [[gnu::noinline]] bool sample_face(const Source& source, const CubeProjection<W>& cube, Ints<W> first_slice,
                                    Floats<W>* out) {
     const CubeCorner<W> corner = cube_corner<W>(source.width, cube);
     if (corner.crosses) return false;
-    const int channels = raw_channels<C>(*source.plan);
     const Place<W> place = place_texel<W>(source, corner.x, corner.y, first_slice + cube.face);
     Floats<W> sum[4] = {};
-    for (int row = 0; row < 2; ++row) {
+    const auto add_row = [&](Ints<W> offset, Floats<W> weight_y) {
         Place<W> first, second;
-        first.offset = place.offset + row * source.row_stride, second.offset = first.offset + 4 * raw_words<C>;
-        Floats<W> texels[2][4];
-        load_two_raw<W, C>(source, first, second, texels);
-        for (int i = 0; i < 2; ++i) {
-            const Floats<W> weight =
-                (i == 0 ? 1.0f - corner.fx : corner.fx) * (row == 0 ? 1.0f - corner.fy : corner.fy);
-            for (int c = 0; c < channels; ++c) sum[c] = sum[c] + weight * texels[i][c];
-        }
-    }
+        first.offset = offset, second.offset = offset + 4 * raw_words<C>;
+        add_two_texels<W, C>(source, first, second, true, (1.0f - corner.fx) * weight_y, corner.fx * weight_y, sum);
+    };
+    add_row(place.offset, 1.0f - corner.fy);
+    add_row(place.offset + source.row_stride, corner.fy);
+    const int channels = raw_channels<C>(*source.plan);
     for (int c = 0; c < channels; ++c) out[c] = sum[c];
     finish_raw<W, C>(*source.plan, out);
     return true;
@@ -267,7 +279,47 @@ struct PlainSampling {
     Ints<W> slice;
     rhi::AddressMode u, v;
     bool is_linear;
+    Ints<W> level;
+    Floats<W> next_weight;
+    /// All lanes read level `first` and none behind it, or all of them the two from there on.
+    bool is_one_level;
+    std::int32_t first;
+    std::uint32_t next_bits;  ///< Lanes that read the level behind their first.
 };
+
+/// The two texels along one axis, without border and offset: as `linear_axis`.
+template <int W>
+struct PlainAxis {
+    Ints<W> first, second;
+    Floats<W> weight;    ///< Of the second.
+    bool are_neighbors;  ///< The second lies behind the first in all lanes.
+};
+template <int W>
+NACRE_INLINE PlainAxis<W> plain_axis(Floats<W> s, std::int32_t n, rhi::AddressMode mode) {
+    PlainAxis<W> axis;
+    if (mode == rhi::AddressMode::mirrored_repeat) {
+        const AxisTaps<W> taps = linear_axis<W>(s, n, mode, nullptr);
+        axis.first = taps.first, axis.second = taps.second, axis.weight = taps.weight;
+        axis.are_neighbors = mask_bits<W>(taps.second == taps.first + 1) == all_lanes<W>;
+        return axis;
+    }
+    const Floats<W> u = unnormalized<W>(s, n, mode) - 0.5f, whole = floor_small<W>(u);
+    axis.weight = u - whole;
+    const Ints<W> first = truncate<W>(whole), second = first + 1;
+    const Ints<W> is_out = (first < 0) | (second >= n);
+    axis.are_neighbors = mask_bits<W>(is_out) == 0;
+    axis.first = first, axis.second = second;
+    if (axis.are_neighbors) return axis;
+    if (mode == rhi::AddressMode::repeat) {
+        // From -1 to n.
+        axis.first = first < 0 ? splat<W>(n - 1) : first;
+        axis.second = second >= n ? splat<W>(0) : second;
+    } else {
+        axis.first = clamp<W>(first, 0, n - 1);
+        axis.second = clamp<W>(second, 0, n - 1);
+    }
+    return axis;
+}
 
 template <int W, Codec C>
 [[gnu::noinline]] void sample_plain_once(const PlainSampling<W>& sampling, const Source& source, Floats<W> s,
@@ -282,23 +334,20 @@ template <int W, Codec C>
         place.offset = x.first * bytes + y.first * source.row_stride + slice;
         load_raw<W, C>(source, place, out);
     } else {
-        const int channels = raw_channels<C>(plan);
-        const AxisTaps<W> x = linear_axis<W>(s, source.width, sampling.u, nullptr);
-        const AxisTaps<W> y = linear_axis<W>(t, source.height, sampling.v, nullptr);
+        const PlainAxis<W> x = plain_axis<W>(s, source.width, sampling.u);
+        const PlainAxis<W> y = plain_axis<W>(t, source.height, sampling.v);
         const Ints<W> left = x.first * bytes, right = x.second * bytes;
         Floats<W> sum[4] = {};
-        for (int row = 0; row < 2; ++row) {
-            const Ints<W> above = (row == 0 ? y.first : y.second) * source.row_stride + slice;
-            const Floats<W> weight_y = row == 0 ? 1.0f - y.weight : y.weight;
+        const auto add_row = [&](Ints<W> row, Floats<W> weight_y) {
+            const Ints<W> above = row * source.row_stride + slice;
             Place<W> first, second;
             first.offset = left + above, second.offset = right + above;
-            Floats<W> texels[2][4];
-            load_two_raw<W, C>(source, first, second, texels);
-            const Floats<W> weights[2] = {(1.0f - x.weight) * weight_y, x.weight * weight_y};
-            for (int i = 0; i < 2; ++i) {
-                for (int c = 0; c < channels; ++c) sum[c] = sum[c] + weights[i] * texels[i][c];
-            }
-        }
+            add_two_texels<W, C>(source, first, second, x.are_neighbors, (1.0f - x.weight) * weight_y,
+                                 x.weight * weight_y, sum);
+        };
+        add_row(y.first, 1.0f - y.weight);
+        add_row(y.second, y.weight);
+        const int channels = raw_channels<C>(plan);
         for (int c = 0; c < channels; ++c) out[c] = sum[c];
     }
     finish_raw<W, C>(plan, out);
@@ -320,46 +369,49 @@ NACRE_INLINE void sample_plain_level(const PlainSampling<W>& sampling, const Lev
     });
 }
 
-/// False: not all lanes are filtered in the same way, and nothing was done.
-template <int W, Codec C>
-[[gnu::noinline]] bool sample_plain_levels(PlainSampling<W>& sampling) {
+/// False: not all lanes are filtered in the same way.
+template <int W>
+NACRE_INLINE bool choose_levels(PlainSampling<W>& sampling, LevelOfDetail<W>& detail) {
     const Invocation& call = *sampling.call;
     const ImageView& image = *call.image;
     const rhi::SamplerDesc& sampler = call.sampler->desc;
-    const Ints<W> live = mask_of_bits<W>(call.live);
-    LevelOfDetail<W> detail;
-    Ints<W> level = splat<W>(0);
-    Floats<W> next_weight = splat<W>(0.0f);
+    sampling.level = splat<W>(0);
+    sampling.next_weight = splat<W>(0.0f);
     sampling.is_linear = sampler.magnify == rhi::Filter::linear;
     if (image.mip_count > 1 || sampler.magnify != sampler.minify || sampler.max_anisotropy > 1.0f) {
         const Floats<W> coordinates[2] = {sampling.s, sampling.t};
         level_of_detail<W>(call, coordinates, nullptr, 2, detail);
-        select_levels<W>(detail.lambda, image.mip_count, sampler.mip == rhi::Filter::linear, level, next_weight);
+        select_levels<W>(detail.lambda, image.mip_count, sampler.mip == rhi::Filter::linear, sampling.level,
+                         sampling.next_weight);
         if (sampler.magnify != sampler.minify) {
             const std::uint32_t magnified = mask_bits<W>(detail.lambda <= 0.0f) & call.live;
             if (magnified != 0 && magnified != call.live) return false;
             if (magnified == 0) sampling.is_linear = !sampling.is_linear;
         }
     }
-    Floats<W> out[4];
+    sampling.next_bits = mask_bits<W>(sampling.next_weight > 0.0f) & call.live;
+    sampling.first = sampling.level[first_bit(call.live)];
+    sampling.is_one_level = (mask_bits<W>(sampling.level == sampling.first) & call.live) == call.live;
+    return true;
+}
+
+template <int W, Codec C>
+[[gnu::noinline]] void sample_plain_levels(const PlainSampling<W>& sampling, const LevelOfDetail<W>& detail) {
+    const Invocation& call = *sampling.call;
+    const Ints<W> live = mask_of_bits<W>(call.live), level = sampling.level;
+    const Floats<W> next_weight = sampling.next_weight;
     const Ints<W> has_next = next_weight > 0.0f;
-    const std::uint32_t next_bits = mask_bits<W>(has_next) & call.live;
-    const std::int32_t first = level[first_bit(call.live)];
-    const bool is_one_level = (mask_bits<W>(level == first) & call.live) == call.live;
-    sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(first), out);
-    if (is_one_level && next_bits == 0) {
-        write_result<W>(call, out, live);
-        return true;
-    }
-    if (is_one_level) {
+    Floats<W> out[4];
+    if (sampling.is_one_level) {
+        sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(sampling.first), out);
+        if (sampling.next_bits == 0) return write_result<W>(call, out, live);
         Floats<W> next[4];
-        sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(first) + 1, next);
+        sample_plain_level<W, C>(sampling, detail, static_cast<std::uint32_t>(sampling.first) + 1, next);
         for (int c = 0; c < 4; ++c) {
             const Floats<W> sum = (splat<W>(0.0f) + out[c] * (1.0f - next_weight)) + next[c] * next_weight;
             out[c] = has_next ? sum : out[c];
         }
-        write_result<W>(call, out, live);
-        return true;
+        return write_result<W>(call, out, live);
     }
     for (int c = 0; c < 4; ++c) out[c] = splat<W>(0.0f);
     add_levels<W>(call, level, next_weight, [&](std::int32_t m, Ints<W> mask, Floats<W> weight) {
@@ -371,7 +423,6 @@ template <int W, Codec C>
         }
     });
     write_result<W>(call, out, live);
-    return true;
 }
 
 /// False: the sample is not plain, and nothing was done.
@@ -396,10 +447,50 @@ NACRE_INLINE bool sample_plain(const Invocation& call) {
     sampling.slice = splat<W>(0);
     if (is_array) sampling.slice = array_layer<W>(call.floats<W>(call.arguments->coordinates[2]), image.layer_count);
     sampling.u = sampler.address_u, sampling.v = sampler.address_v;
-    bool is_done = false;
+    LevelOfDetail<W> detail;
+    if (!choose_levels<W>(sampling, detail)) return false;
     visit_codec(source.codec, [&]<Codec C>() {
-        if constexpr (raw_words<C> != 0) is_done = sample_plain_levels<W, C>(sampling);
+        if constexpr (raw_words<C> != 0) sample_plain_levels<W, C>(sampling, detail);
     });
+    return true;
+}
+
+/// The same for cubes in one level that is filtered linearly, where the footprints of all lanes lie on one face each.
+/// False: they do not, and nothing was done.
+template <int W>
+NACRE_INLINE bool sample_plain_cube(const Invocation& call) {
+    const ImageView& image = *call.image;
+    const rhi::SamplerDesc& sampler = call.sampler->desc;
+    if (image.dimension != rhi::ViewDimension::cube || call.has(image_compare) || call.has(image_integer) ||
+        sampler.magnify != rhi::Filter::linear || sampler.minify != rhi::Filter::linear)
+        return false;
+    std::uint32_t level = 0;
+    if (image.mip_count > 1) {
+        // Levels that are computed from derivatives mostly lie between two.
+        if (!call.has(image_lod_explicit) || call.has(image_min_lod)) return false;
+        const Floats<W> lod = call.floats<W>(call.arguments->lod), bias = splat<W>(sampler.mip_bias);
+        const float first = lod[first_bit(call.live)];
+        if ((mask_bits<W>((lod == first) & (bias == 0.0f)) & call.live) != call.live) return false;
+        const float last = static_cast<float>(image.mip_count - 1);
+        float lambda = first > sampler.min_lod ? first : sampler.min_lod;
+        lambda = lambda < sampler.max_lod ? lambda : sampler.max_lod;
+        lambda = lambda > 0.0f ? lambda : 0.0f;
+        lambda = lambda < last ? lambda : last;
+        level = static_cast<std::uint32_t>(lambda);
+        if (static_cast<float>(level) != lambda) return false;
+    }
+    Source source;
+    if (!make_source(image, level, source)) return false;
+    const Floats<W> direction[3] = {call.floats<W>(call.arguments->coordinates[0]),
+                                    call.floats<W>(call.arguments->coordinates[1]),
+                                    call.floats<W>(call.arguments->coordinates[2])};
+    const CubeProjection<W> cube = project_to_cube<W>(direction);
+    bool is_done = false;
+    Floats<W> out[4];
+    visit_codec(source.codec, [&]<Codec C>() {
+        if constexpr (raw_words<C> != 0) is_done = sample_face<W, C>(source, cube, splat<W>(0), out);
+    });
+    if (is_done) write_result<W>(call, out, mask_of_bits<W>(call.live));
     return is_done;
 }
 
@@ -417,7 +508,7 @@ NACRE_INLINE bool can_sample(const Invocation& call) {
 template <int W>
 [[gnu::noinline]] void sample_image(const Invocation& call) {
     if (!can_sample(call)) return write_zeros<W>(call);
-    if (sample_plain<W>(call)) return;
+    if (sample_plain<W>(call) || sample_plain_cube<W>(call)) return;
     const ImageView& image = *call.image;
     const rhi::SamplerDesc& sampler = call.sampler->desc;
     const bool is_integer = call.has(image_integer);

@@ -115,6 +115,39 @@ NACRE_INLINE void gather_pairs(const std::byte* base, Ints<W> offset, Ints<W>& f
     second = gather_words<W>(base + 4, offset);
 }
 
+/// The four words at base + offset[lane]. Whole loads that are sorted afterwards take half of the time of gathers.
+template <int W>
+NACRE_INLINE void gather_quads(const std::byte* base, Ints<W> offset, Ints<W>* words) {
+#ifdef __AVX512F__
+    if constexpr (W == 16) {
+        // The fours of lane i lie where those of lanes i, i + 4, i + 8, i + 12 make one register.
+        alignas(64) std::int32_t places[W];
+        __builtin_memcpy(places, &offset, sizeof places);
+        const auto four = [&](int lane) {
+            return _mm_loadu_si128(reinterpret_cast<const __m128i*>(base + places[lane]));
+        };
+        __m512i fours[4];
+        for (int i = 0; i < 4; ++i) {
+            const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(four(i)), four(i + 4), 1);
+            const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(four(i + 8)), four(i + 12), 1);
+            fours[i] = (__m512i)__builtin_shufflevector((Ints<8>)low, (Ints<8>)high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
+                                                        11, 12, 13, 14, 15);
+        }
+        const auto low = [](__m512i a, __m512i b) { return _mm512_maskz_unpacklo_epi32(0xffff, a, b); };
+        const auto high = [](__m512i a, __m512i b) { return _mm512_maskz_unpackhi_epi32(0xffff, a, b); };
+        const __m512i low_01 = low(fours[0], fours[1]), low_23 = low(fours[2], fours[3]);
+        const __m512i high_01 = high(fours[0], fours[1]), high_23 = high(fours[2], fours[3]);
+        words[0] = (Ints<W>)_mm512_maskz_unpacklo_epi64(0xff, low_01, low_23);
+        words[1] = (Ints<W>)_mm512_maskz_unpackhi_epi64(0xff, low_01, low_23);
+        words[2] = (Ints<W>)_mm512_maskz_unpacklo_epi64(0xff, high_01, high_23);
+        words[3] = (Ints<W>)_mm512_maskz_unpackhi_epi64(0xff, high_01, high_23);
+        return;
+    }
+#endif
+    gather_pairs<W>(base, offset, words[0], words[1]);
+    gather_pairs<W>(base + 8, offset, words[2], words[3]);
+}
+
 /// Texels of 1 or 2 bytes at base + offset[lane], in the low bits; what is above does not matter. Gathers read aligned
 /// words, so that nothing behind the last texel's own word is touched.
 template <int W>
@@ -135,6 +168,46 @@ NACRE_INLINE Ints<W> gather_small_texels(const std::byte* base, Ints<W> offset, 
     return texels;
 #endif
 }
+
+#ifdef __AVX512VBMI__
+/// table[byte] for the three lower bytes of each lane, from a table of 256 floats that is kept by bytes: byte k of entry
+/// i at 256 * k + i, aligned to 64. Permutations of registers look up all channels of all lanes at once, which takes a
+/// fifth of the time of gathers.
+template <int W>
+NACRE_INLINE void look_up_three_bytes(const std::byte* table, Ints<W> word, Floats<W>* out) {
+    __m512i codes;
+    if constexpr (W == 16)
+        codes = (__m512i)word;
+    else if constexpr (W == 8)
+        codes = (__m512i)__builtin_shufflevector(word, word, 0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7);
+    else
+        codes = (__m512i)__builtin_shufflevector(word, word, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3);
+    // In each part of four lanes, the bytes of one channel side by side.
+    const __m512i by_channel = _mm512_set4_epi32(0x0f0b0703, 0x0e0a0602, 0x0d090501, 0x0c080400);
+    codes = _mm512_shuffle_epi8(codes, by_channel);
+    const __mmask64 is_upper = _mm512_movepi8_mask(codes);
+    __m512i bytes[4];
+    for (int k = 0; k < 4; ++k) {
+        const auto part = [&](int i) { return _mm512_load_si512(table + 256 * k + 64 * i); };
+        const __m512i lower = _mm512_permutex2var_epi8(part(0), codes, part(1));
+        const __m512i upper = _mm512_permutex2var_epi8(part(2), codes, part(3));
+        bytes[k] = _mm512_mask_blend_epi8(is_upper, lower, upper);
+    }
+    const __m512i low_01 = _mm512_unpacklo_epi8(bytes[0], bytes[1]), low_23 = _mm512_unpacklo_epi8(bytes[2], bytes[3]);
+    const __m512i high_01 = _mm512_unpackhi_epi8(bytes[0], bytes[1]), high_23 = _mm512_unpackhi_epi8(bytes[2], bytes[3]);
+    const __m512i channels[3] = {_mm512_unpacklo_epi16(low_01, low_23), _mm512_unpackhi_epi16(low_01, low_23),
+                                 _mm512_unpacklo_epi16(high_01, high_23)};
+    for (int c = 0; c < 3; ++c) {
+        const auto all = (Floats<16>)channels[c];
+        if constexpr (W == 16)
+            out[c] = all;
+        else if constexpr (W == 8)
+            out[c] = __builtin_shufflevector(all, all, 0, 1, 2, 3, 4, 5, 6, 7);
+        else
+            out[c] = __builtin_shufflevector(all, all, 0, 1, 2, 3);
+    }
+}
+#endif
 
 /// One bit for each lane of a mask.
 template <int W>
@@ -168,6 +241,22 @@ NACRE_INLINE Floats<W> square_root(Floats<W> x) {
     for (int lane = 0; lane < W; ++lane) root[lane] = __builtin_sqrtf(x[lane]);
     return root;
 }
+
+#ifdef __SSE4_1__
+#define NACRE_NATIVE_FLOOR
+/// The largest whole number that is not above x; infinities and NaN stay.
+template <int W>
+NACRE_INLINE Floats<W> floor_natively(Floats<W> x) {
+#ifdef __AVX512F__
+    if constexpr (W == 16)
+        return (Floats<W>)_mm512_maskz_roundscale_ps(0xffff, (__m512)x, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
+#endif
+#ifdef __AVX__
+    if constexpr (W == 8) return (Floats<W>)_mm256_floor_ps((__m256)x);
+#endif
+    if constexpr (W == 4) return (Floats<W>)_mm_floor_ps((__m128)x);
+}
+#endif
 
 /// x / divisor as IEEE 754 rounds it; the divisor is a whole number below 2^24 and |x| is 0 or above 2^-60. By the
 /// reciprocal and the exact remainder where there are fused operations: Markstein, "Computation of elementary functions

@@ -104,9 +104,16 @@ NACRE_INLINE Floats<W> decode_channel(const ChannelPlan& channel, Ints<W> word) 
     }
 }
 
+/// Linear values of the codes in the three lower bytes.
 template <int W>
-NACRE_INLINE Floats<W> srgb_channel(const std::byte* table, Ints<W> word, int shift) {
-    return (Floats<W>)gather_words<W>(table, (Ints<W>)((Uints<W>)word >> static_cast<unsigned>(shift) << 2) & 1020);
+NACRE_INLINE void decode_srgb(Ints<W> word, Floats<W>* out) {
+#ifdef __AVX512VBMI__
+    look_up_three_bytes<W>(srgb_to_linear_bytes(), word, out);
+#else
+    const auto* table = reinterpret_cast<const std::byte*>(srgb_to_linear_table());
+    for (unsigned c = 0; c < 3; ++c)
+        out[c] = (Floats<W>)gather_words<W>(table, (Ints<W>)((Uints<W>)word >> (8 * c) << 2) & 1020);
+#endif
 }
 
 /// Blocks have no form that all lanes could decode at once: each lane takes its texel from the cache of decoded blocks.
@@ -187,8 +194,7 @@ NACRE_INLINE void decode_raw(const Ints<W>* words, Floats<W>* out) {
     } else if constexpr (C == Codec::rgba8 || C == Codec::srgb8) {
         const Ints<W> word = words[0];
         if constexpr (C == Codec::srgb8) {
-            const auto* table = reinterpret_cast<const std::byte*>(srgb_to_linear_table());
-            for (int c = 0; c < 3; ++c) out[c] = srgb_channel<W>(table, word, 8 * c);
+            decode_srgb<W>(word, out);
         } else {
             for (int c = 0; c < 3; ++c) out[c] = to_floats<W>((word >> (8 * c)) & 255);
         }
@@ -244,14 +250,14 @@ NACRE_INLINE void load_raw(const Source& source, const Place<W>& place, Floats<W
     }
 }
 
-/// Two texels of each lane. Where the second lies behind the first in all lanes, as it mostly does in a footprint, both
-/// are read at once.
+/// Two texels of each lane. `are_neighbors`: the second lies behind the first in all lanes, as it mostly does in a
+/// footprint, and both are read at once.
 template <int W, Codec C>
-NACRE_INLINE void load_two_raw(const Source& source, const Place<W>& first, const Place<W>& second,
+NACRE_INLINE void load_two_raw(const Source& source, const Place<W>& first, const Place<W>& second, bool are_neighbors,
                                Floats<W> (&out)[2][4]) {
     if constexpr (raw_words<C> == 1) {
         Ints<W> words[2];
-        if (mask_bits<W>(second.offset == first.offset + 4) == all_lanes<W>) {
+        if (are_neighbors) {
             gather_pairs<W>(source.base, first.offset, words[0], words[1]);
         } else {
             words[0] = gather_words<W>(source.base, first.offset);
@@ -259,6 +265,16 @@ NACRE_INLINE void load_two_raw(const Source& source, const Place<W>& first, cons
         }
         decode_raw<W, C>(&words[0], out[0]);
         decode_raw<W, C>(&words[1], out[1]);
+    } else if constexpr (raw_words<C> == 2) {
+        Ints<W> words[4];
+        if (are_neighbors) {
+            gather_quads<W>(source.base, first.offset, words);
+        } else {
+            gather_pairs<W>(source.base, first.offset, words[0], words[1]);
+            gather_pairs<W>(source.base, second.offset, words[2], words[3]);
+        }
+        decode_raw<W, C>(&words[0], out[0]);
+        decode_raw<W, C>(&words[2], out[1]);
     } else {
         load_raw<W, C>(source, first, out[0]);
         load_raw<W, C>(source, second, out[1]);
