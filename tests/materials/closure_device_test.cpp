@@ -287,6 +287,8 @@ TEST(ClosureFeatures, WhatASlabDoesNotUseDoesNotExist) {
             if (file.path == path) file.text = "#error this feature is not used\n";
         EXPECT_EQ(words_of({}, files), plain) << path;
     }
+    for (const char* model : {"1", "2"})
+        EXPECT_NE(words_of({{"NACRE_DIFFUSE_MODEL", model}}, embedded_files()), plain) << "diffuse model " << model;
     // The comparison can fail: with a feature the shader is another.
     for (const SlabFeature& feature : slab_features()) {
         if (feature.bit == slab_emission || feature.bit == slab_edge_coverage) continue;
