@@ -82,6 +82,7 @@ void main() {
     slab.emission = next3();
     slab.edge_coverage = next();
     slab.edge_exponent = next();
+    place++;  // priority
     vec3 view = next3();
     vec3 light = next3();
     vec3 random = next3();
