@@ -98,6 +98,10 @@ struct Slab {
     /// slab_edge_coverage. Exponent of 1 - cosine between the two, > 0; 5 is that of Schlick's Fresnel.
     float edge_exponent = 5.0f;
 
+    /// Where two solids overlap, that with the higher priority is there. For whoever follows rays; closures do not use
+    /// it.
+    std::int32_t priority = 0;
+
     bool operator==(const Slab&) const = default;
 };
 

@@ -82,6 +82,7 @@ void main() {
     slab.emission = next3();
     slab.edge_coverage = next();
     slab.edge_exponent = next();
+    place++;  // priority
     vec3 view = next3();
     vec3 light = next3();
     vec3 random = next3();
@@ -164,6 +165,11 @@ TEST_P(ClosureOnDevice, AgreesWithDoublePrecision) {
     std::vector<float> results(count * results_per_point);
     std::memcpy(results.data(), bytes.data(), results.size() * 4);
 
+    // In double precision what is left are the words of tables, which are unpacked in 32 bits, and the points
+    // themselves.
+    // (A direction comes back rounded, and with it the density of narrow lobes would be another.)
+    const bool is_double = std::string_view(GetParam()) == "cpu:double";
+    const double tolerance = is_double ? 1e-5 : 1e-3;
     closures::Library library;
     library.tints = [](std::uint32_t, glm::dvec2 at) {
         return glm::dvec3(at.x, 1.0 - 0.5 * at.y, 0.5 + 0.5 * at.x * at.y);
@@ -214,15 +220,15 @@ TEST_P(ClosureOnDevice, AgreesWithDoublePrecision) {
                                  std::max(std::abs(exact[k]), 1e-30) * (has_film ? 0.1 : 1.0);
             // The count of facets in a cell may fall to the other side of a whole number.
             if (k < 3 && (point.slab.features & slab_glints) != 0) {
-                if (error > 1e-3) ++other_counts;
+                if (error > tolerance) ++other_counts;
                 continue;
             }
-            if (error > 1e-3) ++beyond;
+            if (error > tolerance) ++beyond;
             if (error > worst[k].error) worst[k] = {error, exact[k], i};
         }
         // A sample's direction need not be that of double precision (the choice of a lobe may fall the other way); its
         // weight and density are those of the direction that it has.
-        if (is_black || result[22] <= 0.0f || result[23] > 0.0f) continue;
+        if (is_black || is_double || result[22] <= 0.0f || result[23] > 0.0f) continue;
         const glm::dvec3 direction(result[16], result[17], result[18]);
         ASSERT_NEAR(glm::length(direction), 1.0, 1e-5);
         const double pdf = library.closure_pdf(closure, direction);
@@ -230,11 +236,11 @@ TEST_P(ClosureOnDevice, AgreesWithDoublePrecision) {
     }
     for (std::uint32_t k = 0; k < 16; ++k) {
         const Point& point = points[worst[k].point];
-        EXPECT_LE(worst[k].error, 1e-3) << "result " << k << " exact " << worst[k].exact << " roughness "
-                                        << point.slab.roughness << " anisotropy " << point.slab.anisotropy
-                                        << " features " << point.slab.features << " view " << point.view.x << " "
-                                        << point.view.y << " " << point.view.z << " light " << point.light.x << " "
-                                        << point.light.y << " " << point.light.z << " point " << worst[k].point;
+        EXPECT_LE(worst[k].error, tolerance)
+            << "result " << k << " exact " << worst[k].exact << " roughness " << point.slab.roughness << " anisotropy "
+            << point.slab.anisotropy << " features " << point.slab.features << " view " << point.view.x << " "
+            << point.view.y << " " << point.view.z << " light " << point.light.x << " " << point.light.y << " "
+            << point.light.z << " point " << worst[k].point;
     }
     EXPECT_EQ(beyond, 0);
     EXPECT_LE(other_counts, static_cast<int>(count / 50));
@@ -282,6 +288,8 @@ TEST(ClosureFeatures, WhatASlabDoesNotUseDoesNotExist) {
             if (file.path == path) file.text = "#error this feature is not used\n";
         EXPECT_EQ(words_of({}, files), plain) << path;
     }
+    for (const char* model : {"1", "2"})
+        EXPECT_NE(words_of({{"NACRE_DIFFUSE_MODEL", model}}, embedded_files()), plain) << "diffuse model " << model;
     // The comparison can fail: with a feature the shader is another.
     for (const SlabFeature& feature : slab_features()) {
         if (feature.bit == slab_emission || feature.bit == slab_edge_coverage) continue;
@@ -289,8 +297,11 @@ TEST(ClosureFeatures, WhatASlabDoesNotUseDoesNotExist) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Backends, ClosureOnDevice, ::testing::Values("cpu", "vulkan", "gl"),
-                         [](const auto& parameter) { return std::string(parameter.param); });
+INSTANTIATE_TEST_SUITE_P(Backends, ClosureOnDevice, ::testing::Values("cpu", "cpu:double", "vulkan", "gl"),
+                         [](const auto& parameter) {
+                             return std::string(parameter.param) == "cpu:double" ? "cpu_double"
+                                                                                 : std::string(parameter.param);
+                         });
 
 }  // namespace
 }  // namespace nacre::materials::test
