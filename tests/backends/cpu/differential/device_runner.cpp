@@ -69,9 +69,26 @@ Expected<std::vector<std::uint32_t>> compile(const std::string& text, Stage stag
     return result;
 }
 
-std::vector<std::uint32_t> optimized(const std::vector<std::uint32_t>& words) {
+std::vector<std::uint32_t> optimized(const std::vector<std::uint32_t>& words, Passes passes) {
     spvtools::Optimizer optimizer(SPV_ENV_VULKAN_1_1);
-    optimizer.RegisterPerformancePasses();
+    if (passes == Passes::performance) {
+        optimizer.RegisterPerformancePasses();
+    } else {
+        optimizer.RegisterPass(spvtools::CreateMergeReturnPass())
+            .RegisterPass(spvtools::CreateInlineExhaustivePass())
+            .RegisterPass(spvtools::CreatePrivateToLocalPass())
+            .RegisterPass(spvtools::CreateScalarReplacementPass(100))
+            .RegisterPass(spvtools::CreateLocalAccessChainConvertPass())
+            .RegisterPass(spvtools::CreateLocalMultiStoreElimPass());
+        // One of those that change loops: several behind one another crash now and then.
+        switch (words.size() % 5) {
+            case 0: optimizer.RegisterPass(spvtools::CreateLoopPeelingPass()); break;
+            case 1: optimizer.RegisterPass(spvtools::CreateLoopUnswitchPass()); break;
+            case 2: optimizer.RegisterPass(spvtools::CreateLoopUnrollPass(false, 2)); break;
+            case 3: optimizer.RegisterPass(spvtools::CreateLoopInvariantCodeMotionPass()); break;
+            default: optimizer.RegisterPass(spvtools::CreateIfConversionPass()).RegisterPass(spvtools::CreateCodeSinkingPass()); break;
+        }
+    }
     spvtools::OptimizerOptions options;
     options.set_run_validator(false);
     std::vector<std::uint32_t> result;
