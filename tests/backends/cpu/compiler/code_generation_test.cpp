@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What LLVM's instruction selection does not survive in some versions must not reach it. A failure is a timeout.
+#include <gtest/gtest.h>
 #include <llvm/AsmParser/Parser.h>
 #include <llvm/IR/LLVMContext.h>
 #include <llvm/Support/SourceMgr.h>
-
-#include <gtest/gtest.h>
 
 #include "backends/cpu/compiler/code.h"
 
@@ -37,7 +36,8 @@ TEST(CodeGeneration, EndsForJoinedMasksOfScalarConditions) {
           %d = select <8 x i1> %mask, <8 x i32> %c, <8 x i32> zeroinitializer
           store volatile <8 x i32> %d, ptr %to
           br label %batch
-        })", problem, context);
+        })",
+                                                  problem, context);
     ASSERT_TRUE(module) << problem.getMessage().str();
     (*generator)->prepare(*module);
     const auto object = (*generator)->compile(*module, "masks", false);
