@@ -168,6 +168,7 @@ struct FragmentBatch {
     /// discarded or demoted.
     std::uint32_t live;
     std::uint32_t sample_index;  ///< gl_SampleID, where the program runs for each sample.
+    std::uint32_t samples;       ///< Of the targets: 1 or 4.
     /// Where inside of the pixel the shader runs: (0.5, 0.5), or the sample's place where it runs for each sample.
     float sample_x, sample_y;
     FragmentDoubles* doubles;                              ///< In double precision, else null.

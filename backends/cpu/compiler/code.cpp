@@ -7,6 +7,7 @@
 #include <llvm/Analysis/TargetLibraryInfo.h>
 #include <llvm/Config/llvm-config.h>
 #include <llvm/ExecutionEngine/Orc/LLJIT.h>
+#include <llvm/IR/IRBuilder.h>
 #include <llvm/IR/LegacyPassManager.h>
 #include <llvm/IR/Verifier.h>
 #include <llvm/MC/TargetRegistry.h>
@@ -199,6 +200,25 @@ class OrcGenerator final : public CodeGenerator {
         }
         passes.addPass(llvm::createModuleToFunctionPassAdaptor(lean()));
         passes.run(module, modules);
+        spread_conditions(module);
+    }
+
+    /// Makes a condition for all lanes a splat where it is a choice between all and none: instruction selection of LLVM 19 goes
+    /// round for ever over two such choices of 8 lanes that are joined, where masks have registers of their own (AVX-512).
+    static void spread_conditions(llvm::Module& module) {
+        for (llvm::Function& function : module)
+            for (llvm::BasicBlock& block : function)
+                for (llvm::Instruction& at : llvm::make_early_inc_range(block)) {
+                    auto* choice = llvm::dyn_cast<llvm::SelectInst>(&at);
+                    const auto* type = choice ? llvm::dyn_cast<llvm::FixedVectorType>(choice->getType()) : nullptr;
+                    if (!type || !type->getElementType()->isIntegerTy(1) || !choice->getCondition()->getType()->isIntegerTy(1)) continue;
+                    const auto* yes = llvm::dyn_cast<llvm::Constant>(choice->getTrueValue());
+                    const auto* no = llvm::dyn_cast<llvm::Constant>(choice->getFalseValue());
+                    if (!yes || !no || !yes->isAllOnesValue() || !no->isNullValue()) continue;
+                    llvm::IRBuilder<> builder(choice);
+                    choice->replaceAllUsesWith(builder.CreateVectorSplat(type->getNumElements(), choice->getCondition()));
+                    choice->eraseFromParent();
+                }
     }
 
     llvm::Error define_symbols(llvm::orc::JITDylib& library) {

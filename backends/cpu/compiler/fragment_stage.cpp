@@ -322,7 +322,11 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
                     x = x ? select(is_this, here_x, x) : here_x;
                     y = y ? select(is_this, here_y, y) : here_y;
                 }
-                place = place_at(x, y);
+                // The only sample of other targets is in the middle.
+                llvm::Value* samples = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, samples)), llvm::Align(4));
+                llvm::Value* several = builder.CreateICmpUGT(samples, int32(1));
+                llvm::Value* middle = llvm::ConstantFP::get(x->getType(), 0.5);
+                place = place_at(select(several, x, middle), select(several, y, middle));
             }
             const auto numbers = input_numbers_.find(pointer.variable_id);
             if (numbers == input_numbers_.end() || pointer.dynamic_component) reject("interpolation at a place needs an input with a constant index");

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include <spirv/unified1/GLSL.std.450.h>
+
 namespace nacre::cpu {
 
 using spv::BuiltIn;
@@ -194,13 +196,17 @@ void Uniformity::visit(const Instruction& at, Id block) {
             if (divergent_return_[callee.id]) mark(divergent_, at.result);
             return;
         }
-        case Op::OpExtInst:
-            if (any_operand(2)) mark(divergent_, at.result);
+        case Op::OpExtInst: {
+            const std::uint32_t number = at.operand(1);
+            // An input at a place in each pixel; its pointer and the place are uniform.
+            const bool interpolates = module_.is_glsl_set(at.operand(0)) && number >= GLSLstd450InterpolateAtCentroid && number <= GLSLstd450InterpolateAtOffset;
+            if (interpolates || any_operand(2)) mark(divergent_, at.result);
             // modf and frexp write through a pointer.
             if (module_.is_glsl_set(at.operand(0)) && at.operands.size() > 3)
                 if (const Id root = root_of(at.operand(3)); root && (is_divergent(at.operand(2)) || is_partial(block)))
                     mark(content_, root);
             return;
+        }
         case Op::OpImageSampleImplicitLod: case Op::OpImageSampleExplicitLod: case Op::OpImageSampleDrefImplicitLod:
         case Op::OpImageSampleDrefExplicitLod: case Op::OpImageSampleProjImplicitLod:
         case Op::OpImageSampleProjExplicitLod: case Op::OpImageSampleProjDrefImplicitLod:

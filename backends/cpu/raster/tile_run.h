@@ -91,7 +91,7 @@ struct TileRun {
         for (std::uint32_t sample = 0; sample < most_samples; ++sample) memory.streams[sample].quads = 0;
         if (targets.samples > 1) return;
         // The same for all batches.
-        for (std::uint32_t i = 0; i < stream_quads / (job.lanes / 4); ++i) set_samples(memory.batches[i], 0, false);
+        for (std::uint32_t i = 0; i < stream_quads / (job.lanes / 4); ++i) set_samples(memory.batches[i], 1, 0, false);
     }
 
     // ---- Targets -------------------------------------------------------------------------------------------------
@@ -487,7 +487,7 @@ struct TileRun {
         batch.doubles = memory.doubles ? memory.doubles + (&batch - memory.batches) : nullptr;
         if (targets.samples == 1) return;
         const bool single = draw->runs_per_sample;
-        set_samples(batch, stream_index, single);
+        set_samples(batch, targets.samples, stream_index, single);
         if (single) return;
         for (std::uint32_t lane = 0; lane < 4 * quads; ++lane) {
             const std::uint32_t bits = stream.covered[first + lane / 4][lane & 3];
@@ -502,8 +502,8 @@ struct TileRun {
     }
     /// Where the invocations of a batch run.
     /// @param single  at the place of that sample
-    static void set_samples(FragmentBatch& batch, std::uint32_t sample, bool single) {
-        batch.sample_index = sample;
+    static void set_samples(FragmentBatch& batch, std::uint32_t samples, std::uint32_t sample, bool single) {
+        batch.samples = samples, batch.sample_index = sample;
         batch.sample_x = single ? static_cast<float>(sample_offset_x[sample]) / subpixels : 0.5f;
         batch.sample_y = single ? static_cast<float>(sample_offset_y[sample]) / subpixels : 0.5f;
         store(batch.sample_mask_in, ints(single ? 1 << sample : 1));

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Atomic instructions of 32 and 64 bits, in buffers and in a workgroup's memory: what they return and what they leave, at the
-// least and largest values and where all invocations meet in one place.
+// Atomic instructions of 32 and 64 bits, in buffers and in a workgroup's memory: what they return and what they leave,
+// at the least and largest values and where all invocations meet in one place.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
@@ -9,9 +12,6 @@
 #include <string>
 #include <type_traits>
 #include <vector>
-
-#include <fmt/format.h>
-#include <gtest/gtest.h>
 
 #include "tests/backends/cpu/compiler/compute_runner.h"
 
@@ -42,7 +42,8 @@ std::vector<Atomic<T>> atomics() {
         {"OpAtomicXor %t %place %scope %none %y", [](T x, T y) { return static_cast<T>(x ^ y); }},
         {"OpAtomicExchange %t %place %scope %none %y", [](T, T y) { return y; }},
         // Compared with y: one more where it is equal.
-        {"OpAtomicCompareExchange %t %place %scope %none %none %y_plus_1 %y", [](T x, T y) { return x == y ? static_cast<T>(U(y) + 1) : x; }},
+        {"OpAtomicCompareExchange %t %place %scope %none %none %y_plus_1 %y",
+         [](T x, T y) { return x == y ? static_cast<T>(U(y) + 1) : x; }},
         {"OpAtomicIIncrement %t %place %scope %none", [](T x, T) { return static_cast<T>(U(x) + 1); }},
         {"OpAtomicIDecrement %t %place %scope %none", [](T x, T) { return static_cast<T>(U(x) - 1); }},
         {"OpAtomicLoad %t %place %scope %none", [](T x, T) { return x; }},
@@ -73,7 +74,8 @@ void check(bool in_workgroup) {
         %procedure = OpTypeFunction %void
         %t = OpTypeInt {} {}
         )",
-                                   bits == 64 ? "OpCapability Int64\nOpCapability Int64Atomics" : "", invocations, sizeof(T), bits, std::is_signed_v<T> ? 1 : 0);
+                                   bits == 64 ? "OpCapability Int64\nOpCapability Int64Atomics" : "", invocations,
+                                   sizeof(T), bits, std::is_signed_v<T> ? 1 : 0);
     const std::string word = std::is_same_v<T, std::uint32_t> ? "%t" : "%u32";
     if (word != "%t") text += "%u32 = OpTypeInt 32 0\n";
     text += fmt::format(R"(
@@ -104,7 +106,8 @@ void check(bool in_workgroup) {
         text += fmt::format("%edge{} = OpConstant %t {}\n", i, static_cast<T>(edges[i]));
         members += fmt::format(" %edge{}", i);
     }
-    for (std::size_t i = 0; i < list.size() * 2; ++i) text += fmt::format("%at{} = OpConstant {} {}\n", i, word, i * invocations);
+    for (std::size_t i = 0; i < list.size() * 2; ++i)
+        text += fmt::format("%at{} = OpConstant {} {}\n", i, word, i * invocations);
     text += fmt::format(R"(%all_edges = OpConstantComposite %edge_array{1}
         %edges = OpVariable %edges_pointer Private %all_edges
         %main = OpFunction %void None %procedure
@@ -121,18 +124,23 @@ void check(bool in_workgroup) {
         )",
                         word, members);
     for (std::size_t i = 0; i < list.size(); ++i) {
-        text += fmt::format("%before_at{0} = OpIAdd {3} %at{1} %i\n%left_at{0} = OpIAdd {3} %at{2} %i\n"
-                            "%before_place{0} = OpAccessChain %value_pointer %result %none %before_at{0}\n"
-                            "%left_place{0} = OpAccessChain %value_pointer %result %none %left_at{0}\n",
-                            i, i * 2, i * 2 + 1, word);
+        text += fmt::format(
+            "%before_at{0} = OpIAdd {3} %at{1} %i\n%left_at{0} = OpIAdd {3} %at{2} %i\n"
+            "%before_place{0} = OpAccessChain %value_pointer %result %none %before_at{0}\n"
+            "%left_place{0} = OpAccessChain %value_pointer %result %none %left_at{0}\n",
+            i, i * 2, i * 2 + 1, word);
         const std::string place = in_workgroup ? "%shared_place" : fmt::format("%left_place{}", i);
         std::string instruction = list[i].text;
         instruction.replace(instruction.find("%place"), 6, place);
         instruction.replace(instruction.find("%scope"), 6, in_workgroup ? "%workgroup" : "%device");
-        text += fmt::format("OpStore {1} %x\n%before{0} = {2}\nOpStore %before_place{0} %before{0}\n", i, place, instruction);
-        if (in_workgroup) text += fmt::format("%left{0} = OpLoad %t %shared_place\nOpStore %left_place{0} %left{0}\n", i);
+        text += fmt::format("OpStore {1} %x\n%before{0} = {2}\nOpStore %before_place{0} %before{0}\n", i, place,
+                            instruction);
+        if (in_workgroup)
+            text += fmt::format("%left{0} = OpLoad %t %shared_place\nOpStore %left_place{0} %left{0}\n", i);
     }
-    const ComputeRunner runner{.spec = "cpu:consistent", .result_words = static_cast<std::uint32_t>(list.size() * 2 * invocations * sizeof(T) / 4)};
+    const ComputeRunner runner{
+        .spec = "cpu:consistent",
+        .result_words = static_cast<std::uint32_t>(list.size() * 2 * invocations * sizeof(T) / 4)};
     const auto found = runner.run_assembly(text + "OpReturn\nOpFunctionEnd\n", 0x10300);
     ASSERT_TRUE(found) << found.error().message();
     std::vector<T> values(list.size() * 2 * invocations);
@@ -141,7 +149,8 @@ void check(bool in_workgroup) {
         for (std::size_t at = 0; at < invocations; ++at) {
             const T x = static_cast<T>(edges[at / 8]), y = static_cast<T>(edges[at % 8]);
             EXPECT_EQ(values[i * 2 * invocations + at], x) << list[i].text << " returns what was there";
-            EXPECT_EQ(values[(i * 2 + 1) * invocations + at], list[i].left(x, y)) << list[i].text << " of " << +x << ", " << +y;
+            EXPECT_EQ(values[(i * 2 + 1) * invocations + at], list[i].left(x, y))
+                << list[i].text << " of " << +x << ", " << +y;
         }
 }
 

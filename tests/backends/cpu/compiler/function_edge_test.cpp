@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Functions to which Vulkan gives a tolerance, in shaders, where their arguments are zero, denormal, huge, infinite or NaN;
-// against double precision. And packing of numbers that the packed format cannot hold.
+// Functions to which Vulkan gives a tolerance, in shaders, where their arguments are zero, denormal, huge, infinite or
+// NaN; against double precision. And packing of numbers that the packed format cannot hold.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -8,9 +11,6 @@
 #include <limits>
 #include <string>
 #include <vector>
-
-#include <fmt/format.h>
-#include <gtest/gtest.h>
 
 #include "tests/backends/cpu/compiler/compute_runner.h"
 
@@ -27,12 +27,13 @@ double ulp(double value) { return std::ldexp(1.0, std::max(-126, std::ilogb(std:
 
 constexpr double no_bound = HUGE_VAL;
 
-// Vulkan specification, "Precision and Operation of SPIR-V Instructions": the errors of what others are derived from. They hold
-// for finite arguments.
+// Vulkan specification, "Precision and Operation of SPIR-V Instructions": the errors of what others are derived from.
+// They hold for finite arguments.
 double exponential_error(double x, double y) { return (3 + 2 * std::abs(x)) * ulp(y); }
 double logarithm_error(double x, double y) { return x >= 0.5 && x <= 2.0 ? 0x1p-21 : 3 * ulp(y); }
 double arctangent_error(double, double y) { return 4096 * ulp(y); }
-/// Its table has the error within [-pi, pi]; backends/cpu/compiler/math/math.h promises more, and a result in [-1, 1] beyond.
+/// Its table has the error within [-pi, pi]; backends/cpu/compiler/math/math.h promises more, and a result in [-1, 1]
+/// beyond.
 double sine_error(double x, double) { return std::abs(x) <= 1e5 ? 0x1p-11 : 2.0; }
 /// (exp(x) - exp(-x)) / 2, or the sum.
 double hyperbolic_error(double x, double y) {
@@ -44,7 +45,7 @@ double inverse_hyperbolic_error(double argument) {
 }
 
 struct Function {
-    const char* glsl;                      ///< Of float x.
+    const char* glsl;  ///< Of float x.
     double (*exact)(double);
     double (*tolerance)(double x, double y);  ///< Of a finite argument and result.
 };
@@ -53,7 +54,8 @@ const Function functions[] = {
     {"sin(x)", [](double x) { return std::sin(x); }, sine_error},
     {"cos(x)", [](double x) { return std::cos(x); }, sine_error},
     // Where the table says nothing of sine and cosine, their quotient may be anything.
-    {"abs(x) <= 1e5 || isinf(x) ? tan(x) : x", [](double x) { return std::abs(x) <= 1e5 || std::isinf(x) ? std::tan(x) : x; },
+    {"abs(x) <= 1e5 || isinf(x) ? tan(x) : x",
+     [](double x) { return std::abs(x) <= 1e5 || std::isinf(x) ? std::tan(x) : x; },
      [](double x, double y) {
          const double sine = std::abs(std::sin(x)), cosine = std::abs(std::cos(x)), error = sine_error(x, 0);
          if (std::abs(x) > 1e5) return 0.0;
@@ -68,11 +70,13 @@ const Function functions[] = {
      [](double x, double y) {
          const double s = std::sinh(x), c = std::cosh(x);
          // Where both overflow, the result is the limit.
-         return std::abs(x) > 80 ? ulp(1.0) : (hyperbolic_error(x, s) + std::abs(y) * hyperbolic_error(x, c)) / c + 2.5 * ulp(y);
+         return std::abs(x) > 80 ? ulp(1.0)
+                                 : (hyperbolic_error(x, s) + std::abs(y) * hyperbolic_error(x, c)) / c + 2.5 * ulp(y);
      }},
     {"asinh(x)", [](double x) { return std::asinh(x); },
      [](double x, double) { return inverse_hyperbolic_error(std::abs(x) + std::sqrt(x * x + 1)); }},
-    {"acosh(x)", [](double x) { return std::acosh(x); }, [](double x, double) { return inverse_hyperbolic_error(x + std::sqrt(x * x - 1)); }},
+    {"acosh(x)", [](double x) { return std::acosh(x); },
+     [](double x, double) { return inverse_hyperbolic_error(x + std::sqrt(x * x - 1)); }},
     {"atanh(x)", [](double x) { return std::atanh(x); },
      [](double x, double) { return inverse_hyperbolic_error((1 + std::abs(x)) / (1 - std::abs(x))) / 2; }},
     {"exp(x)", [](double x) { return std::exp(x); }, exponential_error},
@@ -83,8 +87,10 @@ const Function functions[] = {
     {"sqrt(x)", [](double x) { return std::sqrt(x); }, [](double, double y) { return 4.5 * ulp(y); }},
     {"inversesqrt(x)", [](double x) { return 1 / std::sqrt(x); }, [](double, double y) { return 2 * ulp(y); }},
     {"1.0 / x", [](double x) { return 1 / x; }, [](double, double y) { return 2.5 * ulp(y); }},
-    {"radians(x)", [](double x) { return x * 3.14159265358979323846 / 180; }, [](double, double y) { return 2 * ulp(y); }},
-    {"degrees(x)", [](double x) { return x * 180 / 3.14159265358979323846; }, [](double, double y) { return 2 * ulp(y); }},
+    {"radians(x)", [](double x) { return x * 3.14159265358979323846 / 180; },
+     [](double, double y) { return 2 * ulp(y); }},
+    {"degrees(x)", [](double x) { return x * 180 / 3.14159265358979323846; },
+     [](double, double y) { return 2 * ulp(y); }},
 };
 
 struct FunctionOfTwo {
@@ -103,7 +109,8 @@ double power_error(double x, double y, double result) {
 }
 
 const FunctionOfTwo functions_of_two[] = {
-    {"atan(x, y)", [](double x, double y) { return std::atan2(x, y); }, [](double, double, double result) { return arctangent_error(0, result); }},
+    {"atan(x, y)", [](double x, double y) { return std::atan2(x, y); },
+     [](double, double, double result) { return arctangent_error(0, result); }},
     {"pow(x, y)", power, power_error},
 };
 
@@ -111,8 +118,8 @@ const std::vector<Word> edges{
     0x00000000, 0x80000000,                          // Zeros.
     0x00000001, 0x80000001, 0x007fffff, 0x807fffff,  // Denormals.
     0x00800000, 0x80800000, 0x2edbe6ff,              // The least normal; 1e-10.
-    0x3f000000, 0xbf000000, 0x3f7fffff, 0x3f800000, 0xbf800000, 0x3f800001, 0x3fc00000, 0x40000000, 0xc0000000,
-    0x3fc90fdb, 0x40490fdb, 0xc0490fdb,              // pi / 2, pi, -pi.
+    0x3f000000, 0xbf000000, 0x3f7fffff, 0x3f800000, 0xbf800000, 0x3f800001, 0x3fc00000, 0x40000000,
+    0xc0000000, 0x3fc90fdb, 0x40490fdb, 0xc0490fdb,  // pi / 2, pi, -pi.
     0x42b17217, 0xc2b17217, 0x42b20000, 0xc2cff1b5,  // Around the ends of exp: 88.72, 89, -103.97.
     0x42ff0000, 0x43000000, 0xc2fc0000, 0xc3160000,  // And of exp2: 127.5, 128, -126, -150.
     0x47c35000, 0xc7c35000, 0x501502f9,              // 1e5, 1e10.
@@ -125,7 +132,8 @@ std::string problem_of(float found, double exact, double tolerance) {
     if (std::isnan(exact)) return std::isnan(found) ? "" : "not NaN";
     if (std::isnan(found)) return "NaN";
     if (std::isinf(exact)) return found == static_cast<float>(exact) ? "" : "not infinite";
-    if (std::isinf(found)) return (found > 0) == (exact > 0) && std::abs(exact) + tolerance > greatest ? "" : "infinite";
+    if (std::isinf(found))
+        return (found > 0) == (exact > 0) && std::abs(exact) + tolerance > greatest ? "" : "infinite";
     // Results that are denormal may be flushed to zero.
     if (std::abs(exact) < 0x1p-126 && found == 0) return "";
     return std::abs(found - exact) <= tolerance + std::abs(exact) * 0x1p-24 ? "" : "wrong";
@@ -139,31 +147,42 @@ std::string constants(const std::vector<Word>& words, const std::string& name) {
 
 TEST(FunctionEdges, FunctionsOfOneArgumentAreWithinTheTable) {
     const std::size_t count = edges.size();
-    std::string text = fmt::format("layout(local_size_x = {}) in;\nlayout(set = 0, binding = 0) buffer Result {{ uint result[]; }};\n", count) +
-                       constants(edges, "edges") + "void main() { uint at = gl_LocalInvocationIndex; float x = uintBitsToFloat(edges[at]);\n";
-    for (std::size_t i = 0; i < std::size(functions); ++i) text += fmt::format("result[at + {}u] = floatBitsToUint({});\n", i * count, functions[i].glsl);
-    const ComputeRunner runner{.spec = "cpu:consistent", .result_words = static_cast<Word>(count * std::size(functions))};
+    std::string text =
+        fmt::format("layout(local_size_x = {}) in;\nlayout(set = 0, binding = 0) buffer Result {{ uint result[]; }};\n",
+                    count) +
+        constants(edges, "edges") +
+        "void main() { uint at = gl_LocalInvocationIndex; float x = uintBitsToFloat(edges[at]);\n";
+    for (std::size_t i = 0; i < std::size(functions); ++i)
+        text += fmt::format("result[at + {}u] = floatBitsToUint({});\n", i * count, functions[i].glsl);
+    const ComputeRunner runner{.spec = "cpu:consistent",
+                               .result_words = static_cast<Word>(count * std::size(functions))};
     const auto found = runner.run_glsl(text + "}\n");
     ASSERT_TRUE(found) << found.error().message();
     for (std::size_t i = 0; i < std::size(functions); ++i)
         for (std::size_t at = 0; at < count; ++at) {
             const float x = as_float(edges[at]), value = as_float((*found)[i * count + at]);
             const double exact = functions[i].exact(x);
-            const std::string problem = problem_of(value, exact, std::isfinite(x) ? functions[i].tolerance(x, exact) : ulp(exact));
-            EXPECT_EQ(problem, "") << functions[i].glsl << fmt::format(" of {:#x} ({:.9g}): {:.9g}, not {:.9g}", edges[at], x, value, exact);
+            const std::string problem =
+                problem_of(value, exact, std::isfinite(x) ? functions[i].tolerance(x, exact) : ulp(exact));
+            EXPECT_EQ(problem, "") << functions[i].glsl
+                                   << fmt::format(" of {:#x} ({:.9g}): {:.9g}, not {:.9g}", edges[at], x, value, exact);
         }
 }
 
 TEST(FunctionEdges, FunctionsOfTwoArgumentsAreWithinTheTable) {
     const std::size_t count = edges.size(), pairs = count * count;
-    std::string text = fmt::format("layout(local_size_x = {}) in;\nlayout(set = 0, binding = 0) buffer Result {{ uint result[]; }};\n", count) +
-                       constants(edges, "edges") +
-                       fmt::format("void main() {{ for (uint i = 0u; i < {0}u; ++i) {{ float x = uintBitsToFloat(edges[i]), y = "
-                                   "uintBitsToFloat(edges[gl_LocalInvocationIndex]); uint at = i * {0}u + gl_LocalInvocationIndex;\n",
-                                   count);
+    std::string text =
+        fmt::format("layout(local_size_x = {}) in;\nlayout(set = 0, binding = 0) buffer Result {{ uint result[]; }};\n",
+                    count) +
+        constants(edges, "edges") +
+        fmt::format(
+            "void main() {{ for (uint i = 0u; i < {0}u; ++i) {{ float x = uintBitsToFloat(edges[i]), y = "
+            "uintBitsToFloat(edges[gl_LocalInvocationIndex]); uint at = i * {0}u + gl_LocalInvocationIndex;\n",
+            count);
     for (std::size_t i = 0; i < std::size(functions_of_two); ++i)
         text += fmt::format("result[at + {}u] = floatBitsToUint({});\n", i * pairs, functions_of_two[i].glsl);
-    const ComputeRunner runner{.spec = "cpu:consistent", .result_words = static_cast<Word>(pairs * std::size(functions_of_two))};
+    const ComputeRunner runner{.spec = "cpu:consistent",
+                               .result_words = static_cast<Word>(pairs * std::size(functions_of_two))};
     const auto found = runner.run_glsl(text + "} }\n");
     ASSERT_TRUE(found) << found.error().message();
     for (std::size_t i = 0; i < std::size(functions_of_two); ++i)
@@ -171,10 +190,12 @@ TEST(FunctionEdges, FunctionsOfTwoArgumentsAreWithinTheTable) {
             const Word a = edges[at / count], b = edges[at % count];
             const float x = as_float(a), y = as_float(b), value = as_float((*found)[i * pairs + at]);
             const double exact = functions_of_two[i].exact(x, y);
-            const double tolerance = std::isfinite(x) && std::isfinite(y) ? functions_of_two[i].tolerance(x, y, exact) : 4096 * ulp(exact);
+            const double tolerance =
+                std::isfinite(x) && std::isfinite(y) ? functions_of_two[i].tolerance(x, y, exact) : 4096 * ulp(exact);
             const std::string problem = problem_of(value, exact, tolerance);
             EXPECT_EQ(problem, "") << functions_of_two[i].glsl
-                                   << fmt::format(" of {:#x} ({:.9g}), {:#x} ({:.9g}): {:.9g}, not {:.9g}", a, x, b, y, value, exact);
+                                   << fmt::format(" of {:#x} ({:.9g}), {:#x} ({:.9g}): {:.9g}, not {:.9g}", a, x, b, y,
+                                                  value, exact);
         }
 }
 
@@ -194,26 +215,36 @@ float unpacked(Word bits, int width, bool is_signed) {
 
 TEST(FunctionEdges, PackingHoldsWhatTheFormatCan) {
     // Beyond the range, at its ends, and between two values.
-    const std::vector<float> numbers{0.0f, -0.0f, 1.0f, -1.0f, 1.5f, -1.5f, 0.5f, -0.5f, 0.5f / 255, 1.5f / 255, 0.5f / 127, -0.5f / 127, 2.5f / 65535,
-                                     1e-40f, 1e30f, -1e30f, HUGE_VALF, -HUGE_VALF, std::nanf(""), 0.999f, 126.5f / 127, 254.5f / 255};
-    const std::vector<Word> words{0u, 1u, 0x7fu, 0x80u, 0x81u, 0xffu, 0x7fffu, 0x8000u, 0x8001u, 0xffffu, 0x7fff0000u, 0x80000000u,
-                                  0x80ff7f01u, 0xffffffffu, 0x12345678u, 0xfedcba98u, 0x80808080u, 0x7f7f7f7fu, 5u, 6u, 7u, 8u};
+    const std::vector<float> numbers{0.0f,          -0.0f,  1.0f,         -1.0f,       1.5f,       -1.5f,
+                                     0.5f,          -0.5f,  0.5f / 255,   1.5f / 255,  0.5f / 127, -0.5f / 127,
+                                     2.5f / 65535,  1e-40f, 1e30f,        -1e30f,      HUGE_VALF,  -HUGE_VALF,
+                                     std::nanf(""), 0.999f, 126.5f / 127, 254.5f / 255};
+    const std::vector<Word> words{0u,          1u,          0x7fu,       0x80u,       0x81u,       0xffu,
+                                  0x7fffu,     0x8000u,     0x8001u,     0xffffu,     0x7fff0000u, 0x80000000u,
+                                  0x80ff7f01u, 0xffffffffu, 0x12345678u, 0xfedcba98u, 0x80808080u, 0x7f7f7f7fu,
+                                  5u,          6u,          7u,          8u};
     ASSERT_EQ(numbers.size(), words.size());
     const std::size_t count = numbers.size();
     std::vector<Word> bits;
     for (const float number : numbers) bits.push_back(as_bits(number));
-    std::string text = fmt::format("layout(local_size_x = {}) in;\nlayout(set = 0, binding = 0) buffer Result {{ uint result[]; }};\n", count) +
-                       constants(bits, "numbers") + constants(words, "words") +
-                       fmt::format("void main() {{ uint at = gl_LocalInvocationIndex; float x = uintBitsToFloat(numbers[at]), y = "
-                                   "uintBitsToFloat(numbers[(at + 5u) % {0}u]); uint w = words[at]; vec4 v;\n",
-                                   count);
-    const char* const packed[] = {"packUnorm4x8(vec4(x, y, y, x))", "packSnorm4x8(vec4(x, y, y, x))", "packUnorm2x16(vec2(x, y))", "packSnorm2x16(vec2(x, y))"};
+    std::string text =
+        fmt::format("layout(local_size_x = {}) in;\nlayout(set = 0, binding = 0) buffer Result {{ uint result[]; }};\n",
+                    count) +
+        constants(bits, "numbers") + constants(words, "words") +
+        fmt::format(
+            "void main() {{ uint at = gl_LocalInvocationIndex; float x = uintBitsToFloat(numbers[at]), y = "
+            "uintBitsToFloat(numbers[(at + 5u) % {0}u]); uint w = words[at]; vec4 v;\n",
+            count);
+    const char* const packed[] = {"packUnorm4x8(vec4(x, y, y, x))", "packSnorm4x8(vec4(x, y, y, x))",
+                                  "packUnorm2x16(vec2(x, y))", "packSnorm2x16(vec2(x, y))"};
     std::size_t row = 0;
     for (const char* one : packed) text += fmt::format("result[at + {}u] = {};\n", row++ * count, one);
-    const char* const opened[] = {"unpackUnorm4x8(w)", "unpackSnorm4x8(w)", "vec4(unpackUnorm2x16(w), 0.0, 0.0)", "vec4(unpackSnorm2x16(w), 0.0, 0.0)"};
+    const char* const opened[] = {"unpackUnorm4x8(w)", "unpackSnorm4x8(w)", "vec4(unpackUnorm2x16(w), 0.0, 0.0)",
+                                  "vec4(unpackSnorm2x16(w), 0.0, 0.0)"};
     for (const char* one : opened) {
         text += fmt::format("v = {};\n", one);
-        for (int i = 0; i < 4; ++i) text += fmt::format("result[at + {}u] = floatBitsToUint(v[{}]);\n", row++ * count, i);
+        for (int i = 0; i < 4; ++i)
+            text += fmt::format("result[at + {}u] = floatBitsToUint(v[{}]);\n", row++ * count, i);
     }
     const ComputeRunner runner{.spec = "cpu:consistent", .result_words = static_cast<Word>(count * row)};
     const auto found = runner.run_glsl(text + "}\n");
@@ -224,7 +255,9 @@ TEST(FunctionEdges, PackingHoldsWhatTheFormatCan) {
             const Word a = normalized(x, low, scale, 255), b = normalized(y, low, scale, 255);
             return a | b << 8 | b << 16 | a << 24;
         };
-        const auto two = [&](float low, float scale) { return normalized(x, low, scale, 65535) | normalized(y, low, scale, 65535) << 16; };
+        const auto two = [&](float low, float scale) {
+            return normalized(x, low, scale, 65535) | normalized(y, low, scale, 65535) << 16;
+        };
         EXPECT_EQ((*found)[at], four(0, 255)) << packed[0] << " of " << x << ", " << y;
         EXPECT_EQ((*found)[count + at], four(-1, 127)) << packed[1] << " of " << x << ", " << y;
         EXPECT_EQ((*found)[2 * count + at], two(0, 65535)) << packed[2] << " of " << x << ", " << y;
@@ -232,8 +265,11 @@ TEST(FunctionEdges, PackingHoldsWhatTheFormatCan) {
         for (std::size_t kind = 0; kind < 4; ++kind)
             for (std::size_t i = 0; i < 4; ++i) {
                 const int width = kind < 2 ? 8 : 16;
-                const float expected = kind >= 2 && i >= 2 ? 0.0f : unpacked(words[at] >> (width * static_cast<int>(i)), width, kind % 2 == 1);
-                EXPECT_EQ(as_float((*found)[(4 + kind * 4 + i) * count + at]), expected) << opened[kind] << "[" << i << "] of " << std::hex << words[at];
+                const float expected = kind >= 2 && i >= 2
+                                           ? 0.0f
+                                           : unpacked(words[at] >> (width * static_cast<int>(i)), width, kind % 2 == 1);
+                EXPECT_EQ(as_float((*found)[(4 + kind * 4 + i) * count + at]), expected)
+                    << opened[kind] << "[" << i << "] of " << std::hex << words[at];
             }
     }
 }
@@ -267,7 +303,9 @@ TEST(FunctionEdges, HalvesInAWordAreTheNearest) {
         const float opened = as_float((*found)[half * 3]);
         const Word packed = (*found)[half * 3 + 1], middle = (*found)[half * 3 + 2];
         if (std::isnan(value)) {
-            ASSERT_TRUE(std::isnan(opened) && std::isnan(value_of(packed & 0xffff)) && std::isnan(value_of(packed >> 16))) << half;
+            ASSERT_TRUE(std::isnan(opened) && std::isnan(value_of(packed & 0xffff)) &&
+                        std::isnan(value_of(packed >> 16)))
+                << half;
             continue;
         }
         ASSERT_EQ(as_bits(opened), as_bits(static_cast<float>(value))) << half;

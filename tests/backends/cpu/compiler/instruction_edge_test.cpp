@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Instructions of numbers, one by one and in every width, where their arguments are the least, the largest, zero, NaN, infinite
-// or denormal. Expected values are computed in C++; where SPIR-V leaves a result undefined, they are what
+// Instructions of numbers, one by one and in every width, where their arguments are the least, the largest, zero, NaN,
+// infinite or denormal. Expected values are computed in C++; where SPIR-V leaves a result undefined, they are what
 // backends/cpu/compiler/math/math.h promises.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -14,9 +17,6 @@
 #include <type_traits>
 #include <vector>
 
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-
 #include "tests/backends/cpu/compiler/compute_runner.h"
 
 namespace nacre::cpu {
@@ -24,17 +24,20 @@ namespace {
 
 using Word = std::uint64_t;
 
-/// A number of 16 bits. Sums, products, quotients and square roots of such numbers, made in double precision and rounded to
-/// one, are rounded as if only once.
+/// A number of 16 bits. Sums, products, quotients and square roots of such numbers, made in double precision and
+/// rounded to one, are rounded as if only once.
 struct Half {
     std::uint16_t bits = 0;
     Half() = default;
     explicit Half(double value) {
         const std::uint16_t sign = std::signbit(value) ? 0x8000 : 0;
         const double magnitude = std::abs(value);
-        if (std::isnan(value)) bits = 0x7e00;
-        else if (magnitude >= 65520) bits = sign | 0x7c00;
-        else if (magnitude < 0x1p-14) bits = static_cast<std::uint16_t>(sign | static_cast<int>(std::nearbyint(magnitude * 0x1p24)));
+        if (std::isnan(value))
+            bits = 0x7e00;
+        else if (magnitude >= 65520)
+            bits = sign | 0x7c00;
+        else if (magnitude < 0x1p-14)
+            bits = static_cast<std::uint16_t>(sign | static_cast<int>(std::nearbyint(magnitude * 0x1p24)));
         else {
             const int exponent = std::ilogb(magnitude);
             const auto significand = static_cast<int>(std::nearbyint(std::ldexp(magnitude, 10 - exponent)));
@@ -61,8 +64,10 @@ using Exact = std::conditional_t<std::is_same_v<T, Half>, double, T>;
 /// Name of the type in the module.
 template <typename T>
 std::string name_of() {
-    if constexpr (std::is_same_v<T, bool>) return "bool";
-    else return fmt::format("{}{}", is_float<T> ? 'f' : std::is_signed_v<T> ? 's' : 'u', width<T>);
+    if constexpr (std::is_same_v<T, bool>)
+        return "bool";
+    else
+        return fmt::format("{}{}", is_float<T> ? 'f' : std::is_signed_v<T> ? 's' : 'u', width<T>);
 }
 
 template <typename T>
@@ -80,8 +85,8 @@ Word to_word(T value) {
 
 /// One instruction with arguments %x, %y, %z of the row's type; %y_s32 has the low bits of y.
 struct Row {
-    std::string text;      ///< Without "%result = ".
-    std::string result;    ///< Type of the result.
+    std::string text;    ///< Without "%result = ".
+    std::string result;  ///< Type of the result.
     std::function<Word(Word, Word, Word)> expected;
     bool either_zero = false;  ///< Of zeros, the sign is free.
     std::string member;        ///< Of a result that is a structure: the index of the value that is looked at.
@@ -90,19 +95,22 @@ struct Row {
 
 template <typename Result, typename T, typename Function>
 Row row(const std::string& instruction, Function function, const std::string& arguments) {
-    return {.text = fmt::format("{} %{} {}", instruction, name_of<Result>(), arguments),
-            .result = name_of<Result>(),
-            .expected = [function](Word x, Word y, Word z) {
-                return to_word<Result>(static_cast<Result>(function(from_word<T>(x), from_word<T>(y), from_word<T>(z))));
-            }};
+    return {
+        .text = fmt::format("{} %{} {}", instruction, name_of<Result>(), arguments),
+        .result = name_of<Result>(),
+        .expected = [function](Word x, Word y, Word z) {
+            return to_word<Result>(static_cast<Result>(function(from_word<T>(x), from_word<T>(y), from_word<T>(z))));
+        }};
 }
 template <typename T, typename Result = T, typename Function>
 Row unary(const std::string& instruction, Function function) {
-    return row<Result, T>(instruction, [function](T x, T, T) { return function(x); }, "%x");
+    return row<Result, T>(
+        instruction, [function](T x, T, T) { return function(x); }, "%x");
 }
 template <typename T, typename Result = T, typename Function>
 Row binary(const std::string& instruction, Function function) {
-    return row<Result, T>(instruction, [function](T x, T y, T) { return function(x, y); }, "%x %y");
+    return row<Result, T>(
+        instruction, [function](T x, T y, T) { return function(x, y); }, "%x %y");
 }
 /// Instructions of GLSL.std.450.
 template <typename T, typename Result = T, typename Function>
@@ -121,7 +129,9 @@ std::vector<Row> integer_rows() {
     const auto u = [](T x) { return static_cast<U>(x); };
     const auto wrapped = [](auto x) { return static_cast<T>(static_cast<U>(x)); };
     // Nothing traps, and x / 0 is what math.h says.
-    const auto divided = [](S x, S y) -> S { return y == 0 ? S{0} : y == -1 ? static_cast<S>(U{0} - static_cast<U>(x)) : static_cast<S>(x / y); };
+    const auto divided = [](S x, S y) -> S {
+        return y == 0 ? S{0} : y == -1 ? static_cast<S>(U{0} - static_cast<U>(x)) : static_cast<S>(x / y);
+    };
     const auto remainder = [](S x, S y) -> S { return y == 0 ? S{-1} : y == -1 ? S{0} : static_cast<S>(x % y); };
     const auto amount = [u](T y) { return static_cast<int>(u(y) % static_cast<U>(width<T>)); };
     std::vector<Row> rows{
@@ -154,14 +164,18 @@ std::vector<Row> integer_rows() {
         binary<T, bool>("OpSLessThanEqual", [=](T x, T y) { return s(x) <= s(y); }),
         binary<T, bool>("OpSGreaterThan", [=](T x, T y) { return s(x) > s(y); }),
         binary<T, bool>("OpSGreaterThanEqual", [=](T x, T y) { return s(x) >= s(y); }),
-        extended<T>("SAbs", 1, [=](T x, T, T) { return static_cast<T>(s(x) == least ? least : static_cast<S>(s(x) < 0 ? -s(x) : s(x))); }),
+        extended<T>(
+            "SAbs", 1,
+            [=](T x, T, T) { return static_cast<T>(s(x) == least ? least : static_cast<S>(s(x) < 0 ? -s(x) : s(x))); }),
         extended<T>("SSign", 1, [=](T x, T, T) { return static_cast<T>((s(x) > 0) - (s(x) < 0)); }),
         extended<T>("SMin", 2, [=](T x, T y, T) { return static_cast<T>(std::min(s(x), s(y))); }),
         extended<T>("SMax", 2, [=](T x, T y, T) { return static_cast<T>(std::max(s(x), s(y))); }),
         extended<T>("UMin", 2, [=](T x, T y, T) { return static_cast<T>(std::min(u(x), u(y))); }),
         extended<T>("UMax", 2, [=](T x, T y, T) { return static_cast<T>(std::max(u(x), u(y))); }),
-        extended<T>("SClamp", 3, [=](T x, T low, T high) { return static_cast<T>(std::min(std::max(s(x), s(low)), s(high))); }),
-        extended<T>("UClamp", 3, [=](T x, T low, T high) { return static_cast<T>(std::min(std::max(u(x), u(low)), u(high))); }),
+        extended<T>("SClamp", 3,
+                    [=](T x, T low, T high) { return static_cast<T>(std::min(std::max(s(x), s(low)), s(high))); }),
+        extended<T>("UClamp", 3,
+                    [=](T x, T low, T high) { return static_cast<T>(std::min(std::max(u(x), u(low)), u(high))); }),
         // To other widths: by the sign, by zeros, or cut off.
         unary<T, float>("OpConvertSToF", [=](T x) { return static_cast<float>(s(x)); }),
         unary<T, float>("OpConvertUToF", [=](T x) { return static_cast<float>(u(x)); }),
@@ -171,42 +185,57 @@ std::vector<Row> integer_rows() {
     const auto convert = [&]<typename To>(To) {
         if constexpr (sizeof(To) != sizeof(T)) {
             rows.push_back(unary<T, To>("OpSConvert", [=](T x) { return static_cast<To>(s(x)); }));
-            if constexpr (std::is_unsigned_v<To>) rows.push_back(unary<T, To>("OpUConvert", [=](T x) { return static_cast<To>(u(x)); }));
+            if constexpr (std::is_unsigned_v<To>)
+                rows.push_back(unary<T, To>("OpUConvert", [=](T x) { return static_cast<To>(u(x)); }));
         }
     };
     convert(std::int8_t{}), convert(std::uint8_t{}), convert(std::int16_t{}), convert(std::uint16_t{});
     convert(std::int32_t{}), convert(std::uint32_t{}), convert(std::int64_t{}), convert(std::uint64_t{});
     if constexpr (std::is_unsigned_v<T>) {
-        rows.push_back(binary<T>("OpUDiv", [](T x, T y) { return y == 0 ? static_cast<T>(~Word{0}) : static_cast<T>(x / y); }));
-        rows.push_back(binary<T>("OpUMod", [](T x, T y) { return y == 0 ? static_cast<T>(~Word{0}) : static_cast<T>(x % y); }));
+        rows.push_back(
+            binary<T>("OpUDiv", [](T x, T y) { return y == 0 ? static_cast<T>(~Word{0}) : static_cast<T>(x / y); }));
+        rows.push_back(
+            binary<T>("OpUMod", [](T x, T y) { return y == 0 ? static_cast<T>(~Word{0}) : static_cast<T>(x % y); }));
     }
     if constexpr (sizeof(T) == 4) {
         rows.push_back(unary<T>("OpBitCount", [=](T x) { return static_cast<T>(std::popcount(u(x))); }));
         // Beyond the width a field has zeros.
         const auto low_bits = [](U count) { return count >= 32 ? ~0u : (1u << count) - 1; };
         const auto cut = [](U offset, U count) { return offset >= 32 ? 0u : std::min<U>(count, 32 - offset); };
-        rows.push_back(row<T, T>("OpBitFieldUExtract", [=](T x, T offset, T count) {
-            const U bits = cut(u(offset), u(count));
-            return static_cast<T>(bits == 0 ? 0u : u(x) >> u(offset) & low_bits(bits));
-        }, "%x %y %z"));
-        rows.push_back(row<T, T>("OpBitFieldSExtract", [=](T x, T offset, T count) {
-            const U bits = std::min<U>(u(count), 32);
-            if (bits == 0 || u(offset) >= 32) return T{0};
-            return static_cast<T>(static_cast<std::int32_t>(u(x) >> u(offset) << (32 - bits)) >> (32 - bits));
-        }, "%x %y %z"));
-        rows.push_back(row<T, T>("OpBitFieldInsert", [=](T x, T offset, T count) {
-            const U bits = cut(u(offset), u(count));
-            if (bits == 0) return x;
-            const U mask = low_bits(bits) << u(offset);
-            return static_cast<T>((u(x) & ~mask) | (0xa5a5a5a5u << u(offset) & mask));
-        }, fmt::format("%x %{}_pattern %y %z", name_of<T>())));
+        rows.push_back(row<T, T>(
+            "OpBitFieldUExtract",
+            [=](T x, T offset, T count) {
+                const U bits = cut(u(offset), u(count));
+                return static_cast<T>(bits == 0 ? 0u : u(x) >> u(offset) & low_bits(bits));
+            },
+            "%x %y %z"));
+        rows.push_back(row<T, T>(
+            "OpBitFieldSExtract",
+            [=](T x, T offset, T count) {
+                const U bits = std::min<U>(u(count), 32);
+                if (bits == 0 || u(offset) >= 32) return T{0};
+                return static_cast<T>(static_cast<std::int32_t>(u(x) >> u(offset) << (32 - bits)) >> (32 - bits));
+            },
+            "%x %y %z"));
+        rows.push_back(row<T, T>(
+            "OpBitFieldInsert",
+            [=](T x, T offset, T count) {
+                const U bits = cut(u(offset), u(count));
+                if (bits == 0) return x;
+                const U mask = low_bits(bits) << u(offset);
+                return static_cast<T>((u(x) & ~mask) | (0xa5a5a5a5u << u(offset) & mask));
+            },
+            fmt::format("%x %{}_pattern %y %z", name_of<T>())));
         rows.push_back(unary<T>("OpBitReverse", [=](T x) {
             U reversed = 0;
             for (int i = 0; i < 32; ++i) reversed |= (u(x) >> i & 1) << (31 - i);
             return static_cast<T>(reversed);
         }));
-        rows.push_back(extended<T>("FindILsb", 1, [=](T x, T, T) { return x == 0 ? static_cast<T>(-1) : static_cast<T>(std::countr_zero(u(x))); }));
-        rows.push_back(extended<T>("FindUMsb", 1, [=](T x, T, T) { return static_cast<T>(31 - std::countl_zero(u(x))); }));
+        rows.push_back(extended<T>("FindILsb", 1, [=](T x, T, T) {
+            return x == 0 ? static_cast<T>(-1) : static_cast<T>(std::countr_zero(u(x)));
+        }));
+        rows.push_back(
+            extended<T>("FindUMsb", 1, [=](T x, T, T) { return static_cast<T>(31 - std::countl_zero(u(x))); }));
         rows.push_back(extended<T>("FindSMsb", 1, [=](T x, T, T) {
             return static_cast<T>(31 - std::countl_zero(s(x) < 0 ? static_cast<U>(~u(x)) : u(x)));
         }));
@@ -219,11 +248,17 @@ std::vector<Row> integer_rows() {
                 rows.push_back(made);
             }
         };
-        both("OpIAddCarry", [](T x, T y) { return x + y; }, [](T x, T y) { return static_cast<T>((Word{x} + y) >> 32); });
-        both("OpISubBorrow", [](T x, T y) { return x - y; }, [](T x, T y) { return T{x < y}; });
-        both("OpUMulExtended", [](T x, T y) { return x * y; }, [](T x, T y) { return static_cast<T>(Word{x} * y >> 32); });
-        both("OpSMulExtended", [](T x, T y) { return x * y; },
-             [s](T x, T y) { return static_cast<T>(std::int64_t{s(x)} * s(y) >> 32); });
+        both(
+            "OpIAddCarry", [](T x, T y) { return x + y; },
+            [](T x, T y) { return static_cast<T>((Word{x} + y) >> 32); });
+        both(
+            "OpISubBorrow", [](T x, T y) { return x - y; }, [](T x, T y) { return T{x < y}; });
+        both(
+            "OpUMulExtended", [](T x, T y) { return x * y; },
+            [](T x, T y) { return static_cast<T>(Word{x} * y >> 32); });
+        both(
+            "OpSMulExtended", [](T x, T y) { return x * y; },
+            [s](T x, T y) { return static_cast<T>(std::int64_t{s(x)} * s(y) >> 32); });
     }
     return rows;
 }
@@ -302,9 +337,12 @@ std::vector<Row> float_rows() {
         rows.push_back(extended<T>("Fma", 3, [](T x, T y, T z) { return std::fma(x, y, z); }));
         rows.push_back(unary<T, Half>("OpFConvert", [](T x) { return Half(static_cast<float>(x)); }));
     }
-    if constexpr (!std::is_same_v<T, float>) rows.push_back(unary<T, float>("OpFConvert", [](E x) { return static_cast<float>(x); }));
-    if constexpr (!std::is_same_v<T, double>) rows.push_back(unary<T, double>("OpFConvert", [](E x) { return static_cast<double>(x); }));
-    Row ldexp = row<T, T>("OpExtInst", [](T, T, T) { return T(0); }, "%glsl Ldexp %x %y_s32");
+    if constexpr (!std::is_same_v<T, float>)
+        rows.push_back(unary<T, float>("OpFConvert", [](E x) { return static_cast<float>(x); }));
+    if constexpr (!std::is_same_v<T, double>)
+        rows.push_back(unary<T, double>("OpFConvert", [](E x) { return static_cast<double>(x); }));
+    Row ldexp = row<T, T>(
+        "OpExtInst", [](T, T, T) { return T(0); }, "%glsl Ldexp %x %y_s32");
     ldexp.expected = [](Word x, Word y, Word) {
         const std::int32_t exponent = std::clamp(from_word<std::int32_t>(y), -100'000, 100'000);
         return to_word<T>(T(std::ldexp(E(from_word<T>(x)), exponent)));
@@ -330,7 +368,8 @@ std::vector<Row> float_rows() {
              return exponent;
          }));
     for (Row& made : rows)
-        for (const char* free : {"FMin", "FMax", "NMin", "NMax", "NClamp", "FClamp", "FSign"}) made.either_zero |= made.text.find(free) != std::string::npos;
+        for (const char* free : {"FMin", "FMax", "NMin", "NMax", "NClamp", "FClamp", "FSign"})
+            made.either_zero |= made.text.find(free) != std::string::npos;
     return rows;
 }
 
@@ -339,7 +378,8 @@ std::vector<Word> integer_edges() {
     using U = std::make_unsigned_t<T>;
     const U least = U{1} << (width<T> - 1);
     std::vector<Word> list;
-    for (const int value : {0, 1, 2, 3, 5, 7, width<T> / 2, width<T> - 1, width<T>, width<T> + 1, -1, -2, -7}) list.push_back(to_word(static_cast<U>(value)));
+    for (const int value : {0, 1, 2, 3, 5, 7, width<T> / 2, width<T> - 1, width<T>, width<T> + 1, -1, -2, -7})
+        list.push_back(to_word(static_cast<U>(value)));
     for (const U value : {least, static_cast<U>(least - 1), static_cast<U>(least + 1)}) list.push_back(to_word(value));
     return list;
 }
@@ -347,9 +387,17 @@ std::vector<Word> integer_edges() {
 template <typename T>
 std::vector<Word> float_edges() {
     const T greatest = T(std::is_same_v<T, Half> ? 65504.0 : static_cast<double>(std::numeric_limits<Exact<T>>::max()));
-    const T least_normal = T(std::is_same_v<T, Half> ? 0x1p-14 : static_cast<double>(std::numeric_limits<Exact<T>>::min()));
+    const T least_normal =
+        T(std::is_same_v<T, Half> ? 0x1p-14 : static_cast<double>(std::numeric_limits<Exact<T>>::min()));
     const Word sign = Word{1} << (width<T> - 1);
-    std::vector<Word> list{0, sign, 1, sign | 1, to_word(least_normal) - 1, to_word(least_normal), to_word(greatest), to_word(greatest) | sign};
+    std::vector<Word> list{0,
+                           sign,
+                           1,
+                           sign | 1,
+                           to_word(least_normal) - 1,
+                           to_word(least_normal),
+                           to_word(greatest),
+                           to_word(greatest) | sign};
     for (const double value : {1.0, -1.0, 0.5, -2.5, 3.0, HUGE_VAL, -HUGE_VAL}) list.push_back(to_word(T(value)));
     list.push_back(to_word(T(std::nan(""))));
     return list;
@@ -414,8 +462,8 @@ const char* const head = R"(
     %index = OpVariable %index_pointer Input
 )";
 
-/// A module in which invocation i takes for x, y and z the edges i / 16, i % 16 and (i / 16 + i % 16) % 16, and writes two words
-/// for each row.
+/// A module in which invocation i takes for x, y and z the edges i / 16, i % 16 and (i / 16 + i % 16) % 16, and writes
+/// two words for each row.
 template <typename T>
 std::string module_of(const std::vector<Row>& rows, const std::vector<Word>& edges) {
     std::string text = head, members;
@@ -437,10 +485,12 @@ std::string module_of(const std::vector<Row>& rows, const std::vector<Word>& edg
                         members);
     const std::string type = name_of<T>(), unsigned_type = fmt::format("u{}", width<T>);
     for (const char letter : {'x', 'y', 'z'}) {
-        text += fmt::format("%{0}_place = OpAccessChain %edge_pointer %edges %{0}_at\n%{0}_word = OpLoad %u64 %{0}_place\n", letter);
+        text += fmt::format(
+            "%{0}_place = OpAccessChain %edge_pointer %edges %{0}_at\n%{0}_word = OpLoad %u64 %{0}_place\n", letter);
         const std::string narrow = width<T> == 64 ? fmt::format("%{}_word", letter) : fmt::format("%{}_narrow", letter);
         if (width<T> != 64) text += fmt::format("{} = OpUConvert %{} %{}_word\n", narrow, unsigned_type, letter);
-        text += fmt::format("%{} = {} %{} {}\n", letter, type == unsigned_type ? "OpCopyObject" : "OpBitcast", type, narrow);
+        text += fmt::format("%{} = {} %{} {}\n", letter, type == unsigned_type ? "OpCopyObject" : "OpBitcast", type,
+                            narrow);
     }
     text += "%y_low = OpUConvert %u32 %y_word\n%y_s32 = OpBitcast %s32 %y_low\n";
     for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -450,7 +500,8 @@ std::string module_of(const std::vector<Row>& rows, const std::vector<Word>& edg
             const std::size_t at = instruction.find('%');
             const std::size_t end = instruction.find(' ', at);
             instruction.replace(at, end - at, "%" + rows[i].structure);
-            text += fmt::format("%whole{0} = {1}\n%made{0} = OpCompositeExtract %{2} %whole{0} {3}\n", i, instruction, rows[i].result, rows[i].member);
+            text += fmt::format("%whole{0} = {1}\n%made{0} = OpCompositeExtract %{2} %whole{0} {3}\n", i, instruction,
+                                rows[i].result, rows[i].member);
         } else {
             text += fmt::format("%made{} = {}\n", i, instruction);
         }
@@ -458,20 +509,25 @@ std::string module_of(const std::vector<Row>& rows, const std::vector<Word>& edg
             text += fmt::format("%wide{0} = OpSelect %u64 %made{0} %u64_1 %u64_0\n", i);
         } else {
             const std::string bits = rows[i].result.substr(1);
-            text += fmt::format("%bits{0} = {1} %u{2} %made{0}\n", i, rows[i].result[0] == 'u' ? "OpCopyObject" : "OpBitcast", bits);
+            text += fmt::format("%bits{0} = {1} %u{2} %made{0}\n", i,
+                                rows[i].result[0] == 'u' ? "OpCopyObject" : "OpBitcast", bits);
             text += fmt::format("%wide{0} = {1} %u64 %bits{0}\n", i, bits == "64" ? "OpCopyObject" : "OpUConvert");
         }
         text += fmt::format("%pair{0} = OpBitcast %two_words %wide{0}\n", i);
         for (std::size_t half = 0; half < 2; ++half)
-            text += fmt::format("%word{0}_{1} = OpCompositeExtract %u32 %pair{0} {1}\n%at{0}_{1} = OpIAdd %u32 %at{2} %i\n"
-                                "%place{0}_{1} = OpAccessChain %word_pointer %result %u32_0 %at{0}_{1}\nOpStore %place{0}_{1} %word{0}_{1}\n",
-                                i, half, i * 2 + half);
+            text += fmt::format(
+                "%word{0}_{1} = OpCompositeExtract %u32 %pair{0} {1}\n%at{0}_{1} = OpIAdd %u32 %at{2} %i\n"
+                "%place{0}_{1} = OpAccessChain %word_pointer %result %u32_0 %at{0}_{1}\nOpStore %place{0}_{1} "
+                "%word{0}_{1}\n",
+                i, half, i * 2 + half);
     }
     return text + "OpReturn\nOpFunctionEnd\n";
 }
 
 bool is_nan(const std::string& type, Word word) {
-    return type == "f16" ? std::isnan(from_word<Half>(word)) : type == "f32" ? std::isnan(from_word<float>(word)) : type == "f64" && std::isnan(from_word<double>(word));
+    return type == "f16"   ? std::isnan(from_word<Half>(word))
+           : type == "f32" ? std::isnan(from_word<float>(word))
+                           : type == "f64" && std::isnan(from_word<double>(word));
 }
 
 template <typename T>
@@ -484,12 +540,14 @@ void check(const std::vector<Row>& rows, const std::vector<Word>& edges) {
         int wrong = 0;
         for (std::size_t at = 0; at < 256 && wrong < 3; ++at) {
             const Word x = edges[at / 16], y = edges[at % 16], z = edges[(at / 16 + at % 16) % 16];
-            const Word value = (*found)[i * 512 + at] | Word{(*found)[i * 512 + 256 + at]} << 32, expected = rows[i].expected(x, y, z);
+            const Word value = (*found)[i * 512 + at] | Word{(*found)[i * 512 + 256 + at]} << 32,
+                       expected = rows[i].expected(x, y, z);
             const std::string& type = rows[i].result;
             if (value == expected || (is_nan(type, value) && is_nan(type, expected))) continue;
             const Word sign = type[0] == 'f' ? Word{1} << (std::stoi(type.substr(1)) - 1) : 0;
             if (rows[i].either_zero && (value & ~sign) == 0 && (expected & ~sign) == 0) continue;
-            ADD_FAILURE() << rows[i].text << fmt::format(" of {:#x}, {:#x}, {:#x}: {:#x}, not {:#x}", x, y, z, value, expected);
+            ADD_FAILURE() << rows[i].text
+                          << fmt::format(" of {:#x}, {:#x}, {:#x}: {:#x}, not {:#x}", x, y, z, value, expected);
             ++wrong;
         }
     }
@@ -498,7 +556,8 @@ void check(const std::vector<Row>& rows, const std::vector<Word>& edges) {
 template <typename T>
 class InstructionEdges : public testing::Test {};
 
-using Numbers = testing::Types<std::int8_t, std::uint8_t, std::int16_t, std::uint16_t, std::int32_t, std::uint32_t, std::int64_t, std::uint64_t, Half, float, double>;
+using Numbers = testing::Types<std::int8_t, std::uint8_t, std::int16_t, std::uint16_t, std::int32_t, std::uint32_t,
+                               std::int64_t, std::uint64_t, Half, float, double>;
 struct Names {
     template <typename T>
     static std::string GetName(int) {
@@ -508,8 +567,10 @@ struct Names {
 TYPED_TEST_SUITE(InstructionEdges, Numbers, Names);
 
 TYPED_TEST(InstructionEdges, GiveWhatTheyPromise) {
-    if constexpr (is_float<TypeParam>) check<TypeParam>(float_rows<TypeParam>(), float_edges<TypeParam>());
-    else check<TypeParam>(integer_rows<TypeParam>(), integer_edges<TypeParam>());
+    if constexpr (is_float<TypeParam>)
+        check<TypeParam>(float_rows<TypeParam>(), float_edges<TypeParam>());
+    else
+        check<TypeParam>(integer_rows<TypeParam>(), integer_edges<TypeParam>());
 }
 
 }  // namespace

@@ -114,6 +114,35 @@ TEST_P(Interface, ShowsDistancesToTheFragmentStage) {
         }
 }
 
+TEST_P(Interface, InterpolatesAtPlacesInPixels) {
+    const auto words = draw(GetParam(),
+                            corner + R"(
+        layout(location = 0) out vec2 place;
+        void main() {
+            gl_Position = corner();
+            place = (gl_Position.xy * 0.5 + 0.5) * 4.0;
+        })",
+                            R"(
+        layout(location = 0) in vec2 place;
+        layout(location = 0) out uvec4 color;
+        uvec2 hundredths(vec2 x) { return uvec2(x * 100.0 + 0.5); }
+        void main() {
+            uvec2 same = hundredths(interpolateAtOffset(place, vec2(0.25, -0.25)));
+            uvec2 own = hundredths(interpolateAtOffset(place, vec2(gl_FragCoord.x > 2.0 ? -0.5 : 0.25, 0.0)));
+            uvec2 sample_0 = hundredths(interpolateAtSample(place, 0)), inside = hundredths(interpolateAtCentroid(place));
+            color = uvec4(same.x * 1000u + same.y, own.x * 1000u + own.y, sample_0.x * 1000u + sample_0.y, inside.x * 1000u + inside.y);
+        })");
+    ASSERT_TRUE(words) << words.error().message();
+    for (std::uint32_t y = 0; y < side; ++y)
+        for (std::uint32_t x = 0; x < side; ++x) {
+            const std::uint32_t* pixel = words->data() + (y * side + x) * 4;
+            EXPECT_EQ(pixel[0], (x * 100 + 75) * 1000 + y * 100 + 25) << x << " " << y;
+            EXPECT_EQ(pixel[1], (x * 100 + (x < 2 ? 75 : 0)) * 1000 + y * 100 + 50) << x << " " << y;
+            EXPECT_EQ(pixel[2], (x * 100 + 50) * 1000 + y * 100 + 50) << x << " " << y;
+            EXPECT_EQ(pixel[3], (x * 100 + 50) * 1000 + y * 100 + 50) << x << " " << y;
+        }
+}
+
 // The number of the instruction Sqrt is that of the output block's id: none of its distances is written for that.
 TEST(InterfaceOfForeignModules, NumbersThatLookLikeAnOutputDoNotWriteIt) {
     const char* const text = R"(

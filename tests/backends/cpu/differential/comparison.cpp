@@ -13,7 +13,7 @@ namespace nacre::differential {
 
 namespace {
 
-constexpr std::string_view optimized_mark = " optimized";
+constexpr std::string_view optimized_mark = " optimized", reshaped_mark = " reshaped";
 constexpr const char* reference = "vulkan";
 
 std::optional<std::string> difference_of(const Output& first, const Output& second, Stage stage) {
@@ -45,12 +45,16 @@ std::optional<std::string> imprecision_of(const Output& output) {
 Expected<Output> Comparison::run(const std::string& device, const std::string& text, Stage stage) {
     if (compared_ != text) outputs_.clear(), compared_ = text;
     if (const auto found = outputs_.find(device); found != outputs_.end()) return found->second;
-    const bool is_optimized = device.ends_with(optimized_mark);
-    const std::string spec = is_optimized ? device.substr(0, device.size() - optimized_mark.size()) : device;
+    const bool is_optimized = device.ends_with(optimized_mark), is_reshaped = device.ends_with(reshaped_mark);
+    const std::size_t mark = is_optimized ? optimized_mark.size() : is_reshaped ? reshaped_mark.size() : 0;
+    const std::string spec = device.substr(0, device.size() - mark);
     std::string given = text;
     if (spec == reference && given.starts_with(loop_guard)) given.replace(0, std::string_view(loop_guard).size(), loop_guard_for_lavapipe);
     NACRE_TRY(std::vector<std::uint32_t> words, compile(given, stage));
-    if (is_optimized) words = optimized(words);
+    if (mark) {
+        before_run("SPIRV-Tools");
+        words = optimized(words, is_optimized ? Passes::performance : Passes::control_flow);
+    }
     before_run(device);
     auto& runner = runners_[spec];
     if (!runner) {
@@ -77,9 +81,9 @@ std::optional<Comparison::Difference> Comparison::compare(const std::string& fir
 
 std::optional<Comparison::Difference> Comparison::check(const GeneratedShader& shader) {
     // One device of several for each shader: most time is spent on compiling.
-    static const char* const devices[] = {"cpu:consistent", "cpu:fast:lanes=8", "cpu:fast:lanes=4", "cpu:consistent optimized"};
-    const std::string device = devices[shader.seed % 4];
-    const std::string other = has_vulkan ? reference : devices[(shader.seed + 1) % 4];
+    static const std::vector<std::string> all{"cpu:consistent", "cpu:fast:lanes=8", "cpu:fast:lanes=4", "cpu:consistent optimized"};
+    const std::string device = devices.empty() ? all[shader.seed % all.size()] : devices.front();
+    const std::string other = !devices.empty() ? devices.back() : has_vulkan ? reference : all[(shader.seed + 1) % all.size()];
     if (const auto found = compare(device, other, shader.text, shader.stage)) return found;
     if (const auto output = run(device, shader.text, shader.stage))
         if (const auto what = imprecision_of(*output)) return Difference{device, device, *what};

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "tests/backends/cpu/differential/device_runner.h"
 
@@ -16,7 +17,7 @@ namespace nacre::differential {
 class Comparison {
   public:
     struct Difference {
-        std::string first, second;   ///< Devices, "optimized" behind one that ran the optimized module.
+        std::string first, second;   ///< Devices; "optimized" or "reshaped" behind one that ran a changed module.
         std::string what;            ///< Place and values, or the error.
     };
 
@@ -24,8 +25,10 @@ class Comparison {
     std::function<void(const std::string& device)> before_run = [](const std::string&) {};
     /// Compare with Vulkan, too.
     bool has_vulkan = true;
+    /// Not empty: only the first and the last of them are compared.
+    std::vector<std::string> devices;
 
-    /// What one device writes; "optimized" may stand behind its name.
+    /// What one device writes; "optimized" or "reshaped" may stand behind its name.
     Expected<Output> run(const std::string& device, const std::string& text, Stage stage);
     /// The difference between Vulkan and the CPU device that this seed takes, or between that and another where there is no
     /// Vulkan; nothing where they agree.

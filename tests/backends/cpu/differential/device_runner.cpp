@@ -5,12 +5,14 @@
 #include <bit>
 #include <cstring>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 #include <spirv-tools/libspirv.hpp>
 #include <spirv-tools/optimizer.hpp>
 
+#include "rhi/reflection.h"
 #include "rhi/shader_compiler.h"
 #include "samples/backends.h"
 #include "tests/backends/cpu/differential/random.h"
@@ -43,6 +45,10 @@ layout(location = 0) out uvec4 target;
 void main() { target = color; }
 )";
 
+ShaderStage kind_of(Stage stage) {
+    return stage == Stage::compute ? ShaderStage::compute : stage == Stage::fragment ? ShaderStage::fragment : ShaderStage::vertex;
+}
+
 bool may_be_fused(std::uint32_t op) {
     // FNegate, FAdd, FSub, FMul, FDiv, and the products of vectors and matrices up to Dot.
     return op == 127 || op == 129 || op == 131 || op == 133 || op == 136 || (op >= 142 && op <= 148);
@@ -69,9 +75,26 @@ Expected<std::vector<std::uint32_t>> compile(const std::string& text, Stage stag
     return result;
 }
 
-std::vector<std::uint32_t> optimized(const std::vector<std::uint32_t>& words) {
+std::vector<std::uint32_t> optimized(const std::vector<std::uint32_t>& words, Passes passes) {
     spvtools::Optimizer optimizer(SPV_ENV_VULKAN_1_1);
-    optimizer.RegisterPerformancePasses();
+    if (passes == Passes::performance) {
+        optimizer.RegisterPerformancePasses();
+    } else {
+        optimizer.RegisterPass(spvtools::CreateMergeReturnPass())
+            .RegisterPass(spvtools::CreateInlineExhaustivePass())
+            .RegisterPass(spvtools::CreatePrivateToLocalPass())
+            .RegisterPass(spvtools::CreateScalarReplacementPass(100))
+            .RegisterPass(spvtools::CreateLocalAccessChainConvertPass())
+            .RegisterPass(spvtools::CreateLocalMultiStoreElimPass());
+        // One of those that change loops: several behind one another crash now and then.
+        switch (words.size() % 5) {
+            case 0: optimizer.RegisterPass(spvtools::CreateLoopPeelingPass()); break;
+            case 1: optimizer.RegisterPass(spvtools::CreateLoopUnswitchPass()); break;
+            case 2: optimizer.RegisterPass(spvtools::CreateLoopUnrollPass(false, 2)); break;
+            case 3: optimizer.RegisterPass(spvtools::CreateLoopInvariantCodeMotionPass()); break;
+            default: optimizer.RegisterPass(spvtools::CreateIfConversionPass()).RegisterPass(spvtools::CreateCodeSinkingPass()); break;
+        }
+    }
     spvtools::OptimizerOptions options;
     options.set_run_validator(false);
     std::vector<std::uint32_t> result;
@@ -189,8 +212,16 @@ Expected<Output> DeviceRunner::run(const std::vector<std::uint32_t>& words, Stag
         }
         return entries;
     };
-    const ShaderStage kind = stage == Stage::compute ? ShaderStage::compute : stage == Stage::fragment ? ShaderStage::fragment : ShaderStage::vertex;
-    NACRE_TRY(const Shader shader, device.create_shader({.spirv = words, .stage = kind, .name = "generated"}));
+    // Passes may leave nothing that needs one.
+    NACRE_TRY(const ShaderReflection reflection, reflect(words, kind_of(stage)));
+    const auto group_of = [&](auto pipeline) -> Expected<std::optional<BindGroup>> {
+        if (reflection.bindings.empty()) return std::nullopt;
+        NACRE_TRY(const BindGroupLayout layout, device.bind_group_layout(pipeline, 0));
+        NACRE_TRY(std::vector<BindGroupEntry> entries, entries_of(layout));
+        NACRE_TRY(const BindGroup group, device.create_bind_group({.layout = layout, .entries = std::move(entries), .name = "generated"}));
+        return group;
+    };
+    NACRE_TRY(const Shader shader, device.create_shader({.spirv = words, .stage = kind_of(stage), .name = "generated"}));
     Output output;
     const auto append = [&](const std::vector<std::byte>& bytes) {
         const std::size_t first = output.words.size();
@@ -206,11 +237,9 @@ Expected<Output> DeviceRunner::run(const std::vector<std::uint32_t>& words, Stag
         NACRE_CHECK(empty(at.pairs, pair_bytes));
         NACRE_CHECK(device.write_buffer(at.items, std::span<const std::uint32_t>(at.first_items)));
         NACRE_CHECK(device.write_texture(at.texels, std::as_bytes(std::span(at.first_texels))));
-        NACRE_TRY(const BindGroupLayout layout, device.bind_group_layout(pipeline, 0));
-        NACRE_TRY(std::vector<BindGroupEntry> entries, entries_of(layout));
-        NACRE_TRY(const BindGroup group, device.create_bind_group({.layout = layout, .entries = std::move(entries), .name = "generated"}));
+        NACRE_TRY(const std::optional<BindGroup> group, group_of(pipeline));
         list.set_pipeline(pipeline);
-        list.set_bind_group(0, group);
+        if (group) list.set_bind_group(0, *group);
         list.dispatch({.x = workgroups});
         NACRE_TRY(const Fence fence, device.submit(std::move(list)));
         NACRE_CHECK(device.wait(fence));
@@ -223,7 +252,7 @@ Expected<Output> DeviceRunner::run(const std::vector<std::uint32_t>& words, Stag
         NACRE_TRY(const std::vector<std::byte> pairs, device.read_buffer(at.pairs));
         output.pairs.resize(pairs.size() / 4);
         std::memcpy(output.pairs.data(), pairs.data(), pairs.size());
-        device.destroy(group);
+        if (group) device.destroy(*group);
         device.destroy(pipeline);
     } else {
         GraphicsPipelineDesc desc{.vertex = stage == Stage::vertex ? shader : at.vertex,
@@ -236,14 +265,12 @@ Expected<Output> DeviceRunner::run(const std::vector<std::uint32_t>& words, Stag
             desc.vertex_attributes = {{.location = 0, .buffer = 0, .offset = 0, .format = Format::rgba32_uint}};
         }
         NACRE_TRY(const GraphicsPipeline pipeline, device.create_graphics_pipeline(desc));
-        NACRE_TRY(const BindGroupLayout layout, device.bind_group_layout(pipeline, 0));
-        NACRE_TRY(std::vector<BindGroupEntry> entries, entries_of(layout));
-        NACRE_TRY(const BindGroup group, device.create_bind_group({.layout = layout, .entries = std::move(entries), .name = "generated"}));
+        NACRE_TRY(const std::optional<BindGroup> group, group_of(pipeline));
         ColorAttachment attachment{.view = at.target, .load = LoadOperation::clear};
         attachment.clear.uint = {17, 18, 19, 20};
         list.begin_render_pass({.color = {attachment}});
         list.set_pipeline(pipeline);
-        list.set_bind_group(0, group);
+        if (group) list.set_bind_group(0, *group);
         if (stage == Stage::vertex) list.set_vertex_buffer(0, at.attributes);
         list.draw({.vertex_count = stage == Stage::vertex ? side * side : 3});
         list.end_render_pass();
@@ -251,7 +278,7 @@ Expected<Output> DeviceRunner::run(const std::vector<std::uint32_t>& words, Stag
         NACRE_CHECK(device.wait(fence));
         NACRE_TRY(const std::vector<std::byte> pixels, device.read_texture(at.target));
         append(pixels);
-        device.destroy(group);
+        if (group) device.destroy(*group);
         device.destroy(pipeline);
     }
     device.destroy(shader);

@@ -23,8 +23,10 @@ struct Output {
 /// SPIR-V of a generated text, in which no multiplication and addition may be fused: without that, bits are the device's choice.
 /// @param with_lines  with names and line tables
 Expected<std::vector<std::uint32_t>> compile(const std::string& text, Stage stage, bool with_lines = false);
-/// The same module as the performance passes of SPIRV-Tools leave it.
-std::vector<std::uint32_t> optimized(const std::vector<std::uint32_t>& words);
+/// The same module as passes of SPIRV-Tools leave it: those for performance; or those that change control flow most, which leave
+/// single returns, peeled, unswitched and unrolled loops, and branches turned into selections.
+enum class Passes : std::uint8_t { performance, control_flow };
+std::vector<std::uint32_t> optimized(const std::vector<std::uint32_t>& words, Passes passes);
 
 /// One device, with the inputs that all shaders read.
 class DeviceRunner {
