@@ -4,7 +4,7 @@
 //
 //     cpu_mutation_test                                            as many modules as a short test has time for
 //     cpu_mutation_test --seed=1000 --count=100000 --folder=/tmp/found
-//     cpu_mutation_test --seed=1234 --count=1 --in-process         in a debugger
+//     cpu_mutation_test --seed=1234 --in-process                   in a debugger
 //     cpu_mutation_test --run=found.spv                            one module on all devices
 //     cpu_mutation_test --write-seeds=tests/seeds/cpu_spirv_fuzzer  the modules that others are made from
 #include <sys/mman.h>
@@ -58,44 +58,54 @@ struct Progress {
     bool ended = false;
 };
 
-struct MutatedModule {
-    std::string name;
-    rhi::ShaderStage stage = rhi::ShaderStage::compute;
-    Words words;
-};
+/// Makes modules of the seeds by changes that leave them valid, one out of another until it starts again.
+class ModuleSource {
+  public:
+    explicit ModuleSource(std::vector<SeedShader> seeds) : seeds_(std::move(seeds)), latest_(seeds_) {}
 
-/// The module of a number, made of one of the seeds by changes that leave it valid.
-MutatedModule make_module(std::uint64_t number, const std::vector<SeedShader>& seeds, Progress& progress) {
-    Random random(number);
-    MutatedModule made;
-    // Now and then something larger and more regular.
-    if (random.chance(4)) {
-        const differential::GeneratedShader generated = differential::generate(number);
-        if (auto words = differential::compile(generated.text, generated.stage)) {
-            made.name = "generated";
-            made.stage = generated.stage == differential::Stage::compute    ? rhi::ShaderStage::compute
-                         : generated.stage == differential::Stage::fragment ? rhi::ShaderStage::fragment
-                                                                            : rhi::ShaderStage::vertex;
-            made.words = *std::move(words);
+    SeedShader& make(std::uint64_t number, Progress& progress) {
+        Random random(number);
+        // Now and then something larger and more regular.
+        if (random.chance(3)) {
+            const differential::GeneratedShader generated = differential::generate(number);
+            if (auto words = differential::compile(generated.text, generated.stage)) {
+                generated_ = {"generated",
+                              generated.stage == differential::Stage::compute    ? rhi::ShaderStage::compute
+                              : generated.stage == differential::Stage::fragment ? rhi::ShaderStage::fragment
+                                                                                 : rhi::ShaderStage::vertex,
+                              *std::move(words)};
+                return change(generated_, random, progress);
+            }
         }
+        const auto which = static_cast<std::size_t>(random.below(static_cast<int>(seeds_.size())));
+        last_ = which;
+        if (random.chance(15) || latest_[which].words.size() > 3 * seeds_[which].words.size()) latest_[which] = seeds_[which];
+        return change(latest_[which], random, progress);
     }
-    if (made.words.empty()) {
-        const SeedShader& seed = random.pick(seeds);
-        made = {seed.name, seed.stage, seed.words};
+
+    /// The last module was refused: what would be made of it would be refused as well.
+    void start_again() { latest_[last_] = seeds_[last_]; }
+
+  private:
+    static SeedShader& change(SeedShader& at, Random& random, Progress& progress) {
+        int wanted = random.between(1, 4);
+        for (int i = 0; i < 40 && wanted > 0; ++i) {
+            auto module = MutableModule::parse(at.words);
+            if (!module || !module->mutate(random)) continue;
+            Words changed = module->words();
+            if (changed == at.words) continue;
+            ++progress.tried;
+            if (!rhi::spirv::validate(changed, "mutated")) continue;
+            ++progress.valid, --wanted;
+            at.words = std::move(changed);
+        }
+        return at;
     }
-    int wanted = random.between(1, 14);
-    for (int i = 0; i < 60 && wanted > 0; ++i) {
-        auto module = MutableModule::parse(made.words);
-        if (!module || !module->mutate(random)) continue;
-        Words changed = module->words();
-        if (changed == made.words) continue;
-        ++progress.tried;
-        if (!rhi::spirv::validate(changed, "mutated")) continue;
-        ++progress.valid, --wanted;
-        made.words = std::move(changed);
-    }
-    return made;
-}
+
+    std::vector<SeedShader> seeds_, latest_;
+    std::size_t last_ = 0;
+    SeedShader generated_;
+};
 
 void write_words(const std::string& path, const Words& words) {
     std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(words.data()), static_cast<std::streamsize>(words.size() * 4));
@@ -103,15 +113,17 @@ void write_words(const std::string& path, const Words& words) {
 
 /// Runs modules up to the end, or to the first that breaks something.
 void work(std::uint64_t end, Progress& progress) {
-    const auto seeds = seed_shaders();
+    auto seeds = seed_shaders();
     if (!seeds) {
         std::snprintf(progress.reason, sizeof(progress.reason), "%s", seeds.error().message().c_str());
         ++progress.broken;
         return;
     }
+    ModuleSource source(*std::move(seeds));
     std::array<std::unique_ptr<ModuleRunner>, specs.size()> runners;
+    std::ofstream refusals(settings.folder + "/refused.txt", std::ios::app);
     for (; progress.next < end; ++progress.next) {
-        const MutatedModule module = make_module(progress.next, *seeds, progress);
+        const SeedShader& module = source.make(progress.next, progress);
         write_words(settings.folder + "/current.spv", module.words);
         // Few lanes make little code: most modules run with four.
         const std::size_t which = progress.next % 16 < specs.size() ? progress.next % 16 : 0;
@@ -127,8 +139,12 @@ void work(std::uint64_t end, Progress& progress) {
         progress.module_bytes += module.words.size() * 4;
         switch (runners[which]->run(module.words, module.stage, progress.next)) {
             case Outcome::ran: ++progress.ran; break;
-            case Outcome::refused: ++progress.refused; break;
-            case Outcome::lost: ++progress.lost; break;
+            case Outcome::refused:
+                ++progress.refused;
+                source.start_again();
+                refusals << progress.next << " " << module.name << " " << runners[which]->reason() << std::endl;
+                break;
+            case Outcome::lost: ++progress.lost, source.start_again(); break;
             case Outcome::broken: {
                 ++progress.broken;
                 std::snprintf(progress.reason, sizeof(progress.reason), "%s of %s: %s", specs[which], module.name.c_str(), runners[which]->reason().c_str());
@@ -148,7 +164,7 @@ std::string tally(const Progress& progress) {
 
 TEST(CpuMutations, ValidModulesRunAndLeaveTheDeviceSound) {
     setenv("NACRE_CACHE_DIR", "off", 1);
-    setenv("NACRE_CPU_WATCHDOG_SECONDS", "0.3", 1);
+    setenv("NACRE_CPU_WATCHDOG_SECONDS", "0.1", 1);
     if (settings.folder.empty()) settings.folder = fmt::format("{}/mutations-{}", testing::TempDir(), getpid());
     std::filesystem::create_directories(settings.folder);
     void* const memory = mmap(nullptr, sizeof(Progress), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);

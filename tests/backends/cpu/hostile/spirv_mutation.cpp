@@ -490,7 +490,7 @@ bool MutableModule::change_literal() {
         case 0: word += 1; break;
         case 1: word -= 1; break;
         case 2: word ^= 1u << random_->below(6); break;
-        default: word = interesting_word(); break;
+        default: word = random_->chance(70) ? static_cast<std::uint32_t>(random_->below(9)) : interesting_word(); break;
     }
     return true;
 }
@@ -840,7 +840,7 @@ bool MutableModule::insert_loop() {
     Id limit = random_->chance(40) ? find_value(number, at) : 0;
     if (!limit) limit = constant(number, static_cast<std::uint32_t>(random_->between(1, 5)));
     // Now and then a loop that may have no end.
-    Id condition = random_->chance(6) ? find_value(boolean, at) : 0;
+    Id condition = random_->chance(2) ? find_value(boolean, at) : 0;
     rename_predecessor(block, behind, *label);
     std::unordered_map<Id, Id> renamed;
     std::vector<Instruction> copies = cloned(at, end, renamed);
@@ -867,7 +867,7 @@ bool MutableModule::insert_loop() {
         condition = fresh();
         made.push_back(make(random_->pick({Op::OpULessThan, Op::OpSLessThan, Op::OpINotEqual}), boolean, condition, {counter, limit}));
     }
-    const bool is_swapped = random_->chance(10);
+    const bool is_swapped = random_->chance(3);
     made.push_back(make(Op::OpBranchConditional, 0, 0, {condition, is_swapped ? behind : next, is_swapped ? next : behind}));
     made.push_back(make(Op::OpLabel, 0, next, {}));
     made.push_back(make(Op::OpIAdd, number, increased, {counter, constant(number, 1)}));
