@@ -108,7 +108,7 @@ class OrcGenerator final : public CodeGenerator {
 
     Expected<std::vector<std::byte>> compile(llvm::Module& module, const std::string& name, bool has_coroutines) override {
         // Translation with less care takes time in proportion; the usual one does not, where blocks are long.
-        const bool is_huge = module.getInstructionCount() > most_instructions;
+        const bool is_huge = module.getInstructionCount() > most_instructions || largest_block(module) > most_in_block;
         auto machine = make_machine(is_huge ? llvm::CodeGenOptLevel::None : llvm::CodeGenOptLevel::Less);
         if (!machine) return std::unexpected(failed(name, "no target machine"));
         for (llvm::Function& function : module) {
@@ -151,6 +151,15 @@ class OrcGenerator final : public CodeGenerator {
   private:
     /// Instructions of a module up to which its code is worth the time that good code takes.
     static constexpr unsigned most_instructions = 150'000;
+    /// And of one block, since LLVM selects instructions in time by the square of their number there.
+    static constexpr std::size_t most_in_block = 10'000;
+
+    static std::size_t largest_block(const llvm::Module& module) {
+        std::size_t largest = 0;
+        for (const llvm::Function& function : module)
+            for (const llvm::BasicBlock& block : function) largest = std::max(largest, block.size());
+        return largest;
+    }
 
     std::unique_ptr<llvm::TargetMachine> make_machine(llvm::CodeGenOptLevel level) const {
         std::string error;

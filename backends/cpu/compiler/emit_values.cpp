@@ -178,9 +178,10 @@ void Emitter::finish_definition(Id id) {
     keep(value.image), keep(value.sampler);
     if (value.pointer) {
         auto own = std::make_shared<Pointer>(*value.pointer);
-        for (Component* part : {&own->valid, &own->dynamic_component, &own->base, &own->limit, &own->dynamic_offset, &own->descriptor_index,
-                                &own->descriptor_address, &own->image_descriptor, &own->sample})
+        for (Component* part : {&own->valid, &own->dynamic_component, &own->base, &own->shadow, &own->limit, &own->dynamic_offset,
+                                &own->descriptor_index, &own->descriptor_address, &own->image_descriptor, &own->sample})
             keep(*part);
+        for (Pointer::Index& at : own->indices) keep(at.index), keep(at.bound);
         for (Component& coordinate : own->coordinates) keep(coordinate);
         value.pointer = std::move(own);
     }
