@@ -214,6 +214,8 @@ class Emitter {
     Component multiply(const Component& a, std::int64_t factor);
     Component linear(llvm::Value* base, std::int64_t stride);
     Component logical_and(const Component& a, const Component& b);  ///< Null stands for true.
+    /// Rejects operands that validators let pass where the result would not have the type that the module says.
+    void check_result(const Instruction& at, const std::vector<Component>& components);
     [[noreturn]] void reject(std::string reason) const;
     llvm::FunctionCallee external(const char* symbol, llvm::Type* result, std::vector<llvm::Type*> arguments);
     llvm::Value* load_context(std::size_t offset, llvm::Type* type);    ///< Invariant member of ShaderContext.
