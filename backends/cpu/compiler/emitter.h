@@ -435,6 +435,7 @@ class Emitter {
     std::unordered_map<Id, std::uint64_t> workgroup_offsets;
     std::unordered_map<Id, llvm::Value*> ray_queries;
     std::uint64_t workgroup_variable_bytes = 0;
+    std::uint64_t variable_bytes = 0;  ///< Of variables of each lane, on stack or heap.
     std::uint64_t stack_bytes = 0;             ///< Of variables, all together.
     bool has_side_effects = false;             ///< Some store, atomic or image store was emitted.
     llvm::AllocaInst* trace_lane = nullptr;
