@@ -342,6 +342,77 @@ TEST_P(HostileInput, RecursionIsAnError) {
 INSTANTIATE_TEST_SUITE_P(Devices, HostileInput, testing::Values("cpu:fast:lanes=16:threads=2", "cpu:consistent:lanes=4:threads=1"),
                          [](const auto& at) { return std::string(at.param).substr(4, 4) + std::to_string(at.index); });
 
+// ---- What the validator lets pass or nobody writes
+
+class OddModule : public testing::TestWithParam<const char*> {};
+
+TEST_P(OddModule, PointersAreUsedBehindTheBlockThatMakesThem) {
+    const std::string declarations = R"(
+        OpDecorate %floats ArrayStride 4
+        OpDecorate %float_block Block
+        OpMemberDecorate %float_block 0 Offset 0
+        OpDecorate %fout DescriptorSet 0
+        OpDecorate %fout Binding 1
+    )", types = R"(
+        %float = OpTypeFloat 32
+        %f2 = OpConstant %float 2
+        %floats = OpTypeRuntimeArray %float
+        %float_block = OpTypeStruct %floats
+        %float_block_pointer = OpTypePointer StorageBuffer %float_block
+        %float_pointer = OpTypePointer StorageBuffer %float
+        %fout = OpVariable %float_block_pointer StorageBuffer
+    )";
+    std::string text = head(types) + main_of(R"(
+        %bit = OpBitwiseAnd %uint %id %c1
+        %is_odd = OpINotEqual %bool %bit %c0
+        OpBranch %loop
+        %loop = OpLabel
+        %i = OpPhi %uint %c0 %entry %next %continue
+        OpLoopMerge %behind %continue None
+        OpBranch %body
+        %body = OpLabel
+        OpSelectionMerge %joined None
+        OpBranchConditional %is_odd %makes %joined
+        %makes = OpLabel
+        %at = OpAccessChain %float_pointer %fout %c0 %id
+        %is_small = OpULessThan %bool %id %c7
+        OpSelectionMerge %uses_again None
+        OpBranchConditional %is_small %uses %uses_again
+        %uses = OpLabel
+        OpStore %at %f2
+        OpBranch %uses_again
+        %uses_again = OpLabel
+        %v = OpLoad %float %at
+        %sum = OpFAdd %float %v %f2
+        OpStore %at %sum
+        OpBranch %joined
+        %joined = OpLabel
+        OpBranch %continue
+        %continue = OpLabel
+        %next = OpIAdd %uint %i %c1
+        %again = OpULessThan %bool %next %id
+        OpBranchConditional %again %loop %behind
+        %behind = OpLabel
+    )");
+    text.insert(text.find("%void = OpTypeVoid"), declarations);
+    const auto runner = ok(ModuleRunner::create(GetParam()));
+    EXPECT_EQ(runner->run(assemble(text), ShaderStage::compute, 1), Outcome::ran) << runner->reason();
+}
+
+TEST_P(OddModule, ConditionsOfSubgroupsThatAreNumbersAreRefused) {
+    const auto runner = ok(ModuleRunner::create(GetParam()));
+    for (const std::string operation : {"%r = OpGroupNonUniformBallot %words %c3 %id\n", "%r = OpGroupNonUniformAll %bool %c3 %id\n",
+                                        "%r = OpGroupNonUniformAny %bool %c3 %id\n"}) {
+        std::string text = head("%words = OpTypeVector %uint 4\n%c3 = OpConstant %uint 3\n") + main_of(operation);
+        text.insert(text.find("OpMemoryModel"), "OpCapability GroupNonUniform\nOpCapability GroupNonUniformBallot\nOpCapability GroupNonUniformVote\n");
+        EXPECT_EQ(runner->run(assemble(text), ShaderStage::compute, 1), Outcome::refused) << operation;
+        EXPECT_THAT(runner->reason(), HasSubstr("bool")) << operation;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, OddModule, testing::Values("cpu:fast", "cpu:consistent:lanes=4", "cpu:double", "cpu:sanitize"),
+                         [](const auto& at) { return std::string(at.param).substr(4, 4) + std::to_string(at.index); });
+
 // ---- Indices
 
 /// One of each kind of memory with known content, read and written at indices that are mostly out of range.
