@@ -364,34 +364,36 @@ TEST_P(OddModule, PointersAreUsedBehindTheBlockThatMakesThem) {
     )";
     std::string text = head(types) + main_of(R"(
         %bit = OpBitwiseAnd %uint %id %c1
-        %is_odd = OpINotEqual %bool %bit %c0
         OpBranch %loop
         %loop = OpLabel
         %i = OpPhi %uint %c0 %entry %next %continue
         OpLoopMerge %behind %continue None
         OpBranch %body
         %body = OpLabel
-        OpSelectionMerge %joined None
-        OpBranchConditional %is_odd %makes %joined
+        %stays = OpULessThan %bool %i %id
+        OpBranchConditional %stays %makes %behind
         %makes = OpLabel
         %at = OpAccessChain %float_pointer %fout %c0 %id
-        %is_small = OpULessThan %bool %id %c7
-        OpSelectionMerge %uses_again None
-        OpBranchConditional %is_small %uses %uses_again
-        %uses = OpLabel
+        OpBranch %inner
+        %inner = OpLabel
+        %j = OpPhi %uint %c0 %makes %inner_next %inner_continue
+        OpLoopMerge %inner_behind %inner_continue None
+        OpBranch %inner_body
+        %inner_body = OpLabel
         OpStore %at %f2
-        OpBranch %uses_again
-        %uses_again = OpLabel
+        %inner_again = OpULessThan %bool %j %bit
+        OpBranchConditional %inner_again %inner_continue %inner_behind
+        %inner_continue = OpLabel
+        %inner_next = OpIAdd %uint %j %c1
+        OpBranch %inner
+        %inner_behind = OpLabel
         %v = OpLoad %float %at
         %sum = OpFAdd %float %v %f2
         OpStore %at %sum
-        OpBranch %joined
-        %joined = OpLabel
         OpBranch %continue
         %continue = OpLabel
         %next = OpIAdd %uint %i %c1
-        %again = OpULessThan %bool %next %id
-        OpBranchConditional %again %loop %behind
+        OpBranch %loop
         %behind = OpLabel
     )");
     text.insert(text.find("%void = OpTypeVoid"), declarations);
