@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
+#include <map>
+#include <vector>
 
 #include "passes/gbuffer_layout.h"
 #include "passes/tables/ggx_albedo_generator.h"
@@ -54,13 +58,29 @@ TEST_P(Lighting, LambertBallUnderTheSun) {
     EXPECT_GT(compared, 5000);
 }
 
+// The terms of the directional albedo, which are smooth: linear between 1024 cosines that are integrated once.
+std::array<double, 2> albedo_terms(double cosine, double roughness) {
+    constexpr int steps = 1024;
+    static std::map<double, std::vector<std::array<double, 2>>> curves;
+    auto& curve = curves[roughness];
+    if (curve.empty()) curve.resize(steps + 1, {-1.0, -1.0});
+    const auto at = [&](int step) {
+        if (curve[step][0] < 0.0) curve[step] = passes::directional_albedo_terms(double(step) / steps, roughness, 48);
+        return curve[step];
+    };
+    const int step = std::clamp(int(cosine * steps), 1, steps - 1);
+    const double fraction = cosine * steps - step;
+    const auto below = at(step), above = at(step + 1);
+    return {below[0] + fraction * (above[0] - below[0]), below[1] + fraction * (above[1] - below[1])};
+}
+
 /// The reflection model of the lighting pass in double precision, written apart from the shader.
 glm::dvec3 reflected_in_double(const glm::dvec3& n, const glm::dvec3& v, const glm::dvec3& l, const glm::dvec3& diffuse,
                                const glm::dvec3& f0, double f90, double roughness) {
     const double cos_i = glm::dot(n, l);
     if (cos_i <= 0.0) return glm::dvec3(0.0);
     const double cos_o = std::max(glm::dot(n, v), 1e-4);
-    const auto terms = passes::directional_albedo_terms(cos_o, roughness, 48);
+    const auto terms = albedo_terms(cos_o, roughness);
     const double single = terms[0] + terms[1];
     const glm::dvec3 compensation = 1.0 + f0 * (1.0 / single - 1.0);
     const glm::dvec3 albedo = glm::min((f0 * terms[0] + f90 * terms[1]) * compensation, glm::dvec3(1.0));

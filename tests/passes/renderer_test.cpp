@@ -65,7 +65,8 @@ const std::vector<RenderVariant>& render_variants() {
                                      {"vulkan_renderpass", "vulkan:renderpass", "none", "high"},
                                      {"gl", "gl", "none", "high"},
                                      {"gles", "gles", "none", "high"},
-                                     {"gles_minimum_mobile", "gles", "gles31-minimum", "mobile"}};
+                                     {"gles_minimum_mobile", "gles", "gles31-minimum", "mobile"},
+                                     {"cpu", "cpu:consistent", "none", "high"}};
         std::vector<RenderVariant> usable;
         for (const RenderVariant& variant : all) {
             // A device that is here and does not work stays in: its tests say so.
