@@ -3,8 +3,8 @@
 // does not work.
 //
 //     cpu_mutation_test                                            as many modules as a short test has time for
-//     cpu_mutation_test --seed=1000 --count=100000 --folder=/tmp/found
-//     cpu_mutation_test --seed=1234 --in-process                   in a debugger
+//     cpu_mutation_test --seed=1000 --count=100000 --chains --folder=/tmp/found
+//     cpu_mutation_test --seed=1234 --count=1 --in-process         one of them in a debugger
 //     cpu_mutation_test --run=found.spv                            one module on all devices
 //     cpu_mutation_test --write-seeds=tests/seeds/cpu_spirv_fuzzer  the modules that others are made from
 #include <sys/mman.h>
@@ -42,6 +42,7 @@ struct Settings {
     std::uint64_t count = 150;
     std::string folder;  ///< Where modules go that break something; empty: the test's temporary folder.
     bool in_process = false;
+    bool chains = false;  ///< Modules are made one out of another, which is quicker; what a number gives depends on those before.
 } settings;
 
 constexpr int most_seconds = 60;  ///< For one module.
@@ -58,7 +59,7 @@ struct Progress {
     bool ended = false;
 };
 
-/// Makes modules of the seeds by changes that leave them valid, one out of another until it starts again.
+/// Makes modules of the seeds by changes that leave them valid: each from a seed, or one out of another until it starts again.
 class ModuleSource {
   public:
     explicit ModuleSource(std::vector<SeedShader> seeds) : seeds_(std::move(seeds)), latest_(seeds_) {}
@@ -79,7 +80,7 @@ class ModuleSource {
         }
         const auto which = static_cast<std::size_t>(random.below(static_cast<int>(seeds_.size())));
         last_ = which;
-        if (random.chance(15) || latest_[which].words.size() > 3 * seeds_[which].words.size()) latest_[which] = seeds_[which];
+        if (!settings.chains || random.chance(15) || latest_[which].words.size() > 3 * seeds_[which].words.size()) latest_[which] = seeds_[which];
         return change(latest_[which], random, progress);
     }
 
@@ -88,8 +89,8 @@ class ModuleSource {
 
   private:
     static SeedShader& change(SeedShader& at, Random& random, Progress& progress) {
-        int wanted = random.between(1, 4);
-        for (int i = 0; i < 40 && wanted > 0; ++i) {
+        int wanted = random.between(1, settings.chains ? 4 : 12);
+        for (int i = 0; i < 50 && wanted > 0; ++i) {
             auto module = MutableModule::parse(at.words);
             if (!module || !module->mutate(random)) continue;
             Words changed = module->words();
@@ -267,6 +268,7 @@ int main(int argc, char** argv) {
         else if (const auto count = value("count")) settings.count = std::strtoull(count->c_str(), nullptr, 10);
         else if (const auto folder = value("folder")) settings.folder = *folder;
         else if (text == "--in-process") settings.in_process = true;
+        else if (text == "--chains") settings.chains = true;
         else if (const auto file = value("run")) return run_file(*file);
         else if (const auto seeds = value("write-seeds")) return write_seeds(*seeds);
         else {
