@@ -837,15 +837,24 @@ bool MutableModule::insert_loop() {
     const Id boolean = type_like(Op::OpTypeBool, {});
     const Id header = fresh(), body = fresh(), next = fresh(), behind = fresh(), block = instructions_[*label].result;
     const Id counter = fresh(), increased = fresh();
-    Id limit = random_->chance(40) ? find_value(number, at) : 0;
+    // Each invocation may leave in another iteration; seldom after billions of them.
+    std::vector<Instruction> counted;
+    Id limit = random_->chance(45) ? find_value(number, at) : 0;
+    if (limit && random_->chance(95)) {
+        counted.push_back(make(Op::OpBitwiseAnd, number, fresh(), {limit, constant(number, 7)}));
+        limit = counted.back().result;
+    }
     if (!limit) limit = constant(number, static_cast<std::uint32_t>(random_->between(1, 5)));
     // Now and then a loop that may have no end.
     Id condition = random_->chance(2) ? find_value(boolean, at) : 0;
     rename_predecessor(block, behind, *label);
     std::unordered_map<Id, Id> renamed;
     std::vector<Instruction> copies = cloned(at, end, renamed);
-    std::vector<Instruction> made{make(Op::OpBranch, 0, 0, {header}), make(Op::OpLabel, 0, header, {}),
-                                  make(Op::OpPhi, number, counter, {constant(number, 0), block, increased, next})};
+    std::vector<Instruction> made = std::move(counted);
+    made.push_back(make(Op::OpBranch, 0, 0, {header}));
+    made.push_back(make(Op::OpLabel, 0, header, {}));
+    made.push_back(make(Op::OpPhi, number, counter, {constant(number, 0), block, increased, next}));
+    const std::size_t phis = made.size();
     // One value goes from one iteration to the next.
     for (Instruction& copy : copies) {
         if (!copy.result || !is_plain(copy.type)) continue;
@@ -857,7 +866,7 @@ bool MutableModule::insert_loop() {
             made.push_back(make(Op::OpPhi, copy.type, carried, {from, block, copy.result, next}));
             break;
         }
-        if (made.size() > 3) break;
+        if (made.size() > phis) break;
     }
     made.push_back(make(Op::OpLoopMerge, 0, 0, {behind, next, 0}));
     made.push_back(make(Op::OpBranch, 0, 0, {body}));
