@@ -205,6 +205,20 @@ TEST_P(HostileInput, HugeArraysAreErrorsThatNameTheSize) {
               Outcome::ran) << reason();
 }
 
+TEST_P(HostileInput, WholeArraysAreLoadedOrRefused) {
+    // As registers they take the stack of a thread, or much time.
+    for (const int count : {5000, 60000}) {
+        const std::string types = fmt::format("%n = OpConstant %uint {}\n%array = OpTypeArray %uint %n\n%array_pointer = OpTypePointer Private %array\n"
+                                              "%a = OpVariable %array_pointer Private\n%b = OpVariable %array_pointer Private\n", count);
+        std::string copies = "%x = OpAccessChain %private_pointer %a %id\n%y = OpAccessChain %private_pointer %b %id\nOpStore %x %id\n";
+        for (int i = 0; i < 4; ++i)
+            copies += fmt::format("%v{0} = OpLoad %array %{1}\nOpStore %{2} %v{0}\nOpStore %{3} %id\n", i, i % 2 ? "b" : "a", i % 2 ? "a" : "b", i % 2 ? "x" : "y");
+        const Outcome outcome = run(assemble(head(types) + main_of(copies + "%r = OpLoad %uint %y\nOpStore %place %r\n")));
+        EXPECT_EQ(outcome, count == 5000 ? Outcome::ran : outcome) << reason();
+        EXPECT_TRUE(outcome == Outcome::ran || outcome == Outcome::refused);
+    }
+}
+
 TEST_P(HostileInput, AConstantArrayOfAQuarterOfAMillion) {
     std::string constants, list;
     for (int i = 0; i < 1000; ++i) constants += fmt::format("%k{} = OpConstant %uint {}\n", i, i * 7 + 3);
