@@ -132,22 +132,28 @@ class OrcGenerator final : public CodeGenerator {
         }
         if (is_huge) split_blocks(module);
 
-        std::uint64_t stack_bytes = 0;
+        struct {
+            std::uint64_t stack_bytes = 0;
+            bool has_error = false;
+        } told;
         module.getContext().setDiagnosticHandlerCallBack(
-            [](const llvm::DiagnosticInfo* told, void* sum) {
-                if (const auto* frame = llvm::dyn_cast<llvm::DiagnosticInfoStackSize>(told)) *static_cast<std::uint64_t*>(sum) += frame->getStackSize();
+            [](const llvm::DiagnosticInfo* what, void* to) {
+                auto& all = *static_cast<decltype(told)*>(to);
+                if (const auto* frame = llvm::dyn_cast<llvm::DiagnosticInfoStackSize>(what)) all.stack_bytes += frame->getStackSize();
+                all.has_error = all.has_error || what->getSeverity() == llvm::DS_Error;
             },
-            &stack_bytes);
+            &told);
         llvm::SmallVector<char, 0> bytes;
         llvm::raw_svector_ostream stream(bytes);
         llvm::legacy::PassManager passes;
         if (machine->addPassesToEmitFile(passes, stream, nullptr, llvm::CodeGenFileType::ObjectFile))
             return std::unexpected(failed(name, "the target writes no object files"));
         passes.run(module);
+        if (told.has_error) return std::unexpected(failed(name, "LLVM cannot translate the code"));
         // Nothing is on the stack twice, since nothing calls itself.
-        if (stack_bytes > most_stack_bytes)
+        if (told.stack_bytes > most_stack_bytes)
             return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", name),
-                        fmt::format("its values take {} bytes of stack; {} are the most", stack_bytes, most_stack_bytes),
+                        fmt::format("its values take {} bytes of stack; {} are the most", told.stack_bytes, most_stack_bytes),
                         "Load parts of arrays and structures instead of whole ones.");
         const auto* first = reinterpret_cast<const std::byte*>(bytes.data());
         return std::vector<std::byte>(first, first + bytes.size());
