@@ -81,7 +81,7 @@ rhi::Capabilities find_capabilities(std::uint32_t subgroup_size) {
     result.max_sampled_textures = result.max_samplers = {many, many, many};
     result.max_workgroup_size = {1024, 1024, 1024};
     result.max_workgroup_invocations = 1024;
-    result.max_workgroup_memory_bytes = 65536;
+    result.max_workgroup_memory_bytes = most_workgroup_bytes;
     result.max_workgroup_count = most_workgroups;
     result.subgroup_size = subgroup_size;
     result.max_bindless_textures = 65536;

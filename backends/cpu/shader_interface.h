@@ -25,6 +25,7 @@ inline constexpr std::uint32_t max_groups = 8;          ///< rhi::most_bind_grou
 inline constexpr std::uint32_t max_color_outputs = 9;   ///< Locations 0 to 7, and location 0 index 1 (dual source) as the ninth.
 inline constexpr std::uint32_t dual_source_output = 8;
 inline constexpr std::uint32_t push_constant_capacity = 256;
+inline constexpr std::uint32_t most_workgroup_bytes = 65536;  ///< Of the variables of a workgroup.
 
 /// One bound resource. Descriptors of a bind group lie one after another: bindings in rising order, the elements of an
 /// arrayed binding together. Everything is zero or null where nothing is bound: reads give zero then, writes vanish.

@@ -7,6 +7,7 @@
 #include <llvm/Analysis/TargetLibraryInfo.h>
 #include <llvm/Config/llvm-config.h>
 #include <llvm/ExecutionEngine/Orc/LLJIT.h>
+#include <llvm/IR/DiagnosticInfo.h>
 #include <llvm/IR/IRBuilder.h>
 #include <llvm/IR/LegacyPassManager.h>
 #include <llvm/IR/Verifier.h>
@@ -108,8 +109,7 @@ class OrcGenerator final : public CodeGenerator {
     }
 
     Expected<std::vector<std::byte>> compile(llvm::Module& module, const std::string& name, bool has_coroutines) override {
-        // Translation with less care takes time in proportion; the usual one does not, where blocks are long.
-        const bool is_huge = module.getInstructionCount() > most_instructions;
+        bool is_huge = module.getInstructionCount() > most_instructions;
         auto machine = make_machine(is_huge ? llvm::CodeGenOptLevel::None : llvm::CodeGenOptLevel::Less);
         if (!machine) return std::unexpected(failed(name, "no target machine"));
         for (llvm::Function& function : module) {
@@ -118,19 +118,44 @@ class OrcGenerator final : public CodeGenerator {
             function.addFnAttr("target-features", features_);
             function.addFnAttr("prefer-vector-width", "512");
             function.addFnAttr(llvm::Attribute::NoUnwind);
+            function.addFnAttr("warn-stack-size", "0");  // LLVM tells the size of each frame.
         }
         std::string problems;
         llvm::raw_string_ostream problem_stream(problems);
         if (llvm::verifyModule(module, &problem_stream))
             return std::unexpected(failed(name, "the code made is not valid: " + problems));
         optimize(module, *machine, has_coroutines);
+        // Translation with less care takes time in proportion, where blocks are not long; the usual one does so in blocks up to some length.
+        if (!is_huge && largest_block(module) > most_in_block) {
+            is_huge = true;
+            machine = make_machine(llvm::CodeGenOptLevel::None);
+            if (!machine) return std::unexpected(failed(name, "no target machine"));
+        }
+        if (is_huge) split_blocks(module);
 
+        struct {
+            std::uint64_t stack_bytes = 0;
+            bool has_error = false;
+        } told;
+        module.getContext().setDiagnosticHandlerCallBack(
+            [](const llvm::DiagnosticInfo* what, void* to) {
+                auto& all = *static_cast<decltype(told)*>(to);
+                if (const auto* frame = llvm::dyn_cast<llvm::DiagnosticInfoStackSize>(what)) all.stack_bytes += frame->getStackSize();
+                all.has_error = all.has_error || what->getSeverity() == llvm::DS_Error;
+            },
+            &told);
         llvm::SmallVector<char, 0> bytes;
         llvm::raw_svector_ostream stream(bytes);
         llvm::legacy::PassManager passes;
         if (machine->addPassesToEmitFile(passes, stream, nullptr, llvm::CodeGenFileType::ObjectFile))
             return std::unexpected(failed(name, "the target writes no object files"));
         passes.run(module);
+        if (told.has_error) return std::unexpected(failed(name, "LLVM cannot translate the code"));
+        // Nothing is on the stack twice, since nothing calls itself.
+        if (told.stack_bytes > most_stack_bytes)
+            return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", name),
+                        fmt::format("its values take {} bytes of stack; {} are the most", told.stack_bytes, most_stack_bytes),
+                        "Load parts of arrays and structures instead of whole ones.");
         const auto* first = reinterpret_cast<const std::byte*>(bytes.data());
         return std::vector<std::byte>(first, first + bytes.size());
     }
@@ -152,6 +177,40 @@ class OrcGenerator final : public CodeGenerator {
   private:
     /// Instructions of a module up to which its code is worth the time that good code takes.
     static constexpr unsigned most_instructions = 150'000;
+    /// And of one block.
+    static constexpr std::size_t most_in_block = 10'000;
+    /// Of all functions together. Threads of schedulers have 4 MiB of stack.
+    static constexpr std::uint64_t most_stack_bytes = 3 << 20;
+
+    static std::size_t largest_block(const llvm::Module& module) {
+        std::size_t largest = 0;
+        for (const llvm::Function& function : module)
+            for (const llvm::BasicBlock& block : function) largest = std::max(largest, block.size());
+        return largest;
+    }
+
+    /// Makes blocks short: LLVM selects the instructions of one in time by the square of their number.
+    static void split_blocks(llvm::Module& module) {
+        constexpr std::size_t most_at_once = 1000;
+        std::vector<llvm::Instruction*> begins;
+        for (llvm::Function& function : module)
+            for (llvm::BasicBlock& block : function) {
+                std::size_t count = 0;
+                for (llvm::Instruction& at : block) {
+                    // Variables stay together in the first block.
+                    if (llvm::isa<llvm::PHINode>(at) || llvm::isa<llvm::AllocaInst>(at)) count = 0;
+                    else if (++count % most_at_once == 0 && !at.isTerminator()) begins.push_back(&at);
+                }
+                if (&block != &function.getEntryBlock()) continue;
+                llvm::Instruction* last_variable = nullptr;
+                for (llvm::Instruction& at : block)
+                    if (llvm::isa<llvm::AllocaInst>(at)) last_variable = &at;
+                if (last_variable)
+                    std::erase_if(begins, [&](const llvm::Instruction* at) { return at->getParent() == &block && at->comesBefore(last_variable); });
+            }
+        // From the back, so that each moves only what is behind it.
+        for (auto at = begins.rbegin(); at != begins.rend(); ++at) (*at)->getParent()->splitBasicBlock(*at);
+    }
 
     std::unique_ptr<llvm::TargetMachine> make_machine(llvm::CodeGenOptLevel level) const {
         std::string error;

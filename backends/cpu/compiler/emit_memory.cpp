@@ -17,6 +17,8 @@ namespace {
 
 /// Scalars of a variable up to which each load and store names its slots one by one.
 constexpr std::uint32_t most_direct_components = 4096;
+/// Of all variables together. Each thread has that much.
+constexpr std::uint64_t most_variable_bytes = 64 << 20;
 /// Threads of schedulers have a few MiB of stack.
 constexpr std::uint64_t most_stack_bytes = 2 << 20, most_stack_bytes_of_one = 64 << 10;
 
@@ -37,6 +39,9 @@ LaneVariable& Emitter::make_lane_variable(Id variable_id, Id type_id, bool is_un
         const std::uint64_t bytes = std::uint64_t{type.components} * made->slot_bytes * (is_uniform ? 1 : lanes);
         if (bytes > (1u << 24))
             reject(fmt::format("a variable of {} scalars takes {} bytes for {} lanes; 16 MiB is the most", type.components, bytes, lanes));
+        variable_bytes += bytes;
+        if (variable_bytes > most_variable_bytes)
+            reject(fmt::format("the variables take {} bytes for {} lanes; {} is the most", variable_bytes, lanes, most_variable_bytes));
         if (bytes > most_stack_bytes_of_one) made->memory = large_memory(bytes);
         if (made->memory) return *made;
         stack_bytes += bytes;
@@ -678,6 +683,8 @@ void Emitter::declare_variables() {
             workgroup_offsets[id] = workgroup_variable_bytes;
             workgroup_variable_bytes += (module.tight_size(variable.type) + 15) / 16 * 16;
         }
+    if (workgroup_variable_bytes > most_workgroup_bytes)
+        reject(fmt::format("the variables of a workgroup take {} bytes; {} are the most", workgroup_variable_bytes, most_workgroup_bytes));
     if (in_double()) {
         workgroup_shadow_offset = static_cast<std::int64_t>(workgroup_variable_bytes);
         workgroup_variable_bytes *= 3;
@@ -787,7 +794,12 @@ bool Emitter::emit_memory(const Instruction& at) {
             store(get_pointer(at.operand(0)), values);
             return true;
         }
-        case Op::OpCopyMemory: store(get_pointer(at.operand(0)), load(get_pointer(at.operand(1)))); return true;
+        case Op::OpCopyMemory: {
+            const Pointer from = get_pointer(at.operand(1));
+            if (module.type(from.type).components > Module::max_components) reject("a copy of too many scalars; copy a part");
+            store(get_pointer(at.operand(0)), load(from));
+            return true;
+        }
         case Op::OpArrayLength: {
             // Of the last member of the block that the pointer leads to.
             Pointer block = get_pointer(at.operand(0));

@@ -61,6 +61,23 @@ std::optional<std::vector<Component>> Emitter::subgroup_input(spv::BuiltIn built
 }
 
 bool Emitter::emit_subgroup(const Instruction& at) {
+    // Validators look at few of the types here.
+    const auto condition_of = [&](Id id) {
+        const Component condition = get_scalar(id);
+        if (!condition.value->getType()->getScalarType()->isIntegerTy(1)) reject("a condition is not of type bool");
+        return condition;
+    };
+    const auto ballot_of = [&](Id id) {
+        const Component word = get(id).components.at(0);
+        if (!word.value->getType()->getScalarType()->isIntegerTy(32)) reject("a ballot is not made of words");
+        return word;
+    };
+    const auto lane_of = [&](Id id) {
+        const Component lane = get_scalar(id);
+        if (!lane.value->getType()->getScalarType()->isIntegerTy() || lane.value->getType()->getScalarType()->isIntegerTy(1))
+            reject("the number of an invocation is no integer");
+        return lane;
+    };
     const auto operand_value = [&](std::size_t i) { return get(at.operand(i)); };
     // A ballot is four words; only the first has lanes.
     const auto ballot = [&](llvm::Value* lanes_on) {
@@ -83,13 +100,13 @@ bool Emitter::emit_subgroup(const Instruction& at) {
             return true;
         }
         case Op::OpGroupNonUniformAll: case Op::OpSubgroupAllKHR: {
-            const Component condition = get_scalar(at.operand(at.op == Op::OpSubgroupAllKHR ? 0 : 1));
+            const Component condition = condition_of(at.operand(at.op == Op::OpSubgroupAllKHR ? 0 : 1));
             if (condition.is_uniform()) set(at, {condition});
             else set(at, {Component(builder.CreateNot(any(both(mask, builder.CreateNot(condition.value)))))});
             return true;
         }
         case Op::OpGroupNonUniformAny: case Op::OpSubgroupAnyKHR: {
-            const Component condition = get_scalar(at.operand(at.op == Op::OpSubgroupAnyKHR ? 0 : 1));
+            const Component condition = condition_of(at.operand(at.op == Op::OpSubgroupAnyKHR ? 0 : 1));
             if (condition.is_uniform()) set(at, {condition});
             else set(at, {Component(any(condition_mask(condition)))});
             return true;
@@ -116,23 +133,23 @@ bool Emitter::emit_subgroup(const Instruction& at) {
         }
         case Op::OpGroupNonUniformBroadcast: case Op::OpSubgroupReadInvocationKHR: {
             const std::size_t first = at.op == Op::OpSubgroupReadInvocationKHR ? 0 : 1;
-            llvm::Value* lane = narrow(get_scalar(at.operand(first + 1)), mask);
+            llvm::Value* lane = narrow(lane_of(at.operand(first + 1)), mask);
             std::vector<Component> made;
             for (const Component& component : operand_value(first).components) made.push_back(one_lane(component, lane));
             set(at, std::move(made));
             return true;
         }
         case Op::OpGroupNonUniformBallot: case Op::OpSubgroupBallotKHR: {
-            const Component condition = get_scalar(at.operand(at.op == Op::OpSubgroupBallotKHR ? 0 : 1));
+            const Component condition = condition_of(at.operand(at.op == Op::OpSubgroupBallotKHR ? 0 : 1));
             set(at, ballot(condition_mask(condition)));
             return true;
         }
         case Op::OpGroupNonUniformInverseBallot: {
-            set(at, {Component(lane_bit(narrow(operand_value(1).components.at(0), mask)))});
+            set(at, {Component(lane_bit(narrow(ballot_of(at.operand(1)), mask)))});
             return true;
         }
         case Op::OpGroupNonUniformBallotBitExtract: {
-            const Component word = operand_value(1).components.at(0), index = get_scalar(at.operand(2));
+            const Component word = ballot_of(at.operand(1)), index = lane_of(at.operand(2));
             set(at, {apply({word, index}, [&](auto v) {
                     llvm::Value* shifted = builder.CreateLShr(v[0], builder.CreateAnd(v[1], llvm::ConstantInt::get(v[1]->getType(), 31)));
                     return builder.CreateTrunc(shifted, v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(mask_type) : builder.getInt1Ty());
@@ -142,7 +159,7 @@ bool Emitter::emit_subgroup(const Instruction& at) {
         case Op::OpGroupNonUniformBallotBitCount: {
             const auto operation = static_cast<spv::GroupOperation>(at.operand(1));
             llvm::Value* used = int32(static_cast<std::int64_t>((std::uint64_t{1} << lanes) - 1));
-            Component word = apply({operand_value(2).components.at(0)}, [&](auto v) {
+            Component word = apply({ballot_of(at.operand(2))}, [&](auto v) {
                 return builder.CreateAnd(v[0], v[0]->getType()->isVectorTy() ? splat(used) : used);
             });
             if (operation != spv::GroupOperation::Reduce) {
@@ -155,7 +172,7 @@ bool Emitter::emit_subgroup(const Instruction& at) {
             return true;
         }
         case Op::OpGroupNonUniformBallotFindLSB: case Op::OpGroupNonUniformBallotFindMSB: {
-            set(at, {apply({operand_value(1).components.at(0)}, [&](auto v) {
+            set(at, {apply({ballot_of(at.operand(1))}, [&](auto v) {
                     return at.op == Op::OpGroupNonUniformBallotFindLSB ? math.find_lsb(v[0]) : math.find_u_msb(v[0]);
                 })});
             return true;
@@ -165,7 +182,7 @@ bool Emitter::emit_subgroup(const Instruction& at) {
         case Op::OpGroupNonUniformRotateKHR: {
             llvm::Value* operand = nullptr;
             if (at.op != Op::OpGroupNonUniformQuadSwap || !module.constant_word(at.operand(2)))
-                operand = builder.CreateZExtOrTrunc(widen(get_scalar(at.operand(2))), vector_of(builder.getInt32Ty()));
+                operand = builder.CreateZExtOrTrunc(widen(lane_of(at.operand(2))), vector_of(builder.getInt32Ty()));
             else
                 operand = splat(int32(static_cast<std::int64_t>(*module.constant_word(at.operand(2)))));
             llvm::Value* numbers = lane_numbers();
@@ -205,6 +222,14 @@ bool Emitter::emit_subgroup(const Instruction& at) {
     Combination how;
     llvm::Type* kind = scalar.is_scalar() && scalar.bits ? scalar_type(scalar) : nullptr;
     const auto integer = [&](std::uint64_t value) { return llvm::ConstantInt::get(kind, value); };
+    if (at.op >= Op::OpGroupNonUniformIAdd && at.op <= Op::OpGroupNonUniformLogicalXor) {
+        const TypeKind wanted = at.op == Op::OpGroupNonUniformFAdd || at.op == Op::OpGroupNonUniformFMul || at.op == Op::OpGroupNonUniformFMin ||
+                                        at.op == Op::OpGroupNonUniformFMax
+                                    ? TypeKind::floating
+                                : at.op >= Op::OpGroupNonUniformLogicalAnd ? TypeKind::boolean
+                                                                           : TypeKind::integer;
+        if (!kind || scalar.kind != wanted) reject("what is combined is not of the kind that the instruction takes");
+    }
     switch (at.op) {
         case Op::OpGroupNonUniformIAdd: how = {[&](auto* a, auto* b) { return builder.CreateAdd(a, b); }, integer(0)}; break;
         case Op::OpGroupNonUniformFAdd: how = {[&](auto* a, auto* b) { return builder.CreateFAdd(a, b); }, llvm::ConstantFP::get(kind, -0.0)}; break;
@@ -224,6 +249,7 @@ bool Emitter::emit_subgroup(const Instruction& at) {
             how = {[&](auto* a, auto* b) { return builder.CreateXor(a, b); }, llvm::Constant::getNullValue(kind)}; break;
         default: return false;
     }
+    if (module.type_of(at.operand(2)) != at.type) reject("what is combined is not of the type of the result");
     const auto operation = static_cast<spv::GroupOperation>(at.operand(1));
     std::uint32_t cluster = lanes;
     if (operation == spv::GroupOperation::ClusteredReduce)

@@ -138,7 +138,20 @@ std::vector<Component> Emitter::get_components(Id id) {
     return value.pointer ? components_of(*value.pointer) : std::move(value.components);
 }
 
+void Emitter::check_result(const Instruction& at, const std::vector<Component>& components) {
+    if (!module.has_type(at.type)) return;
+    const Type& type = module.type(at.type);
+    if (!type.is_scalar() && type.kind != TypeKind::vector && type.kind != TypeKind::matrix) return;
+    llvm::Type* expected = scalar_type(module.type(component_type(at.type, 0)));
+    const auto is_other = [&](const Component& component) {
+        return component.value && component.value->getType()->getScalarType() != expected;
+    };
+    if (components.size() != type.components || std::ranges::any_of(components, is_other))
+        reject("the operands are not of the types that the result needs");
+}
+
 void Emitter::set(const Instruction& at, std::vector<Component> components) {
+    check_result(at, components);
     // What the analysis holds for uniform is kept as a scalar, so that slots and branches can rely on it.
     if (!uniformity.is_divergent(at.result))
         for (Component& component : components)
@@ -178,9 +191,10 @@ void Emitter::finish_definition(Id id) {
     keep(value.image), keep(value.sampler);
     if (value.pointer) {
         auto own = std::make_shared<Pointer>(*value.pointer);
-        for (Component* part : {&own->valid, &own->dynamic_component, &own->base, &own->limit, &own->dynamic_offset, &own->descriptor_index,
-                                &own->descriptor_address, &own->image_descriptor, &own->sample})
+        for (Component* part : {&own->valid, &own->dynamic_component, &own->base, &own->shadow, &own->limit, &own->dynamic_offset,
+                                &own->descriptor_index, &own->descriptor_address, &own->image_descriptor, &own->sample})
             keep(*part);
+        for (Pointer::Index& at : own->indices) keep(at.index), keep(at.bound);
         for (Component& coordinate : own->coordinates) keep(coordinate);
         value.pointer = std::move(own);
     }

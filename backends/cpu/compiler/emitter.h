@@ -214,6 +214,8 @@ class Emitter {
     Component multiply(const Component& a, std::int64_t factor);
     Component linear(llvm::Value* base, std::int64_t stride);
     Component logical_and(const Component& a, const Component& b);  ///< Null stands for true.
+    /// Rejects operands that validators let pass where the result would not have the type that the module says.
+    void check_result(const Instruction& at, const std::vector<Component>& components);
     [[noreturn]] void reject(std::string reason) const;
     llvm::FunctionCallee external(const char* symbol, llvm::Type* result, std::vector<llvm::Type*> arguments);
     llvm::Value* load_context(std::size_t offset, llvm::Type* type);    ///< Invariant member of ShaderContext.
@@ -459,6 +461,7 @@ class Emitter {
     std::unordered_map<Id, std::uint64_t> workgroup_offsets;
     std::unordered_map<Id, llvm::Value*> ray_queries;
     std::uint64_t workgroup_variable_bytes = 0;
+    std::uint64_t variable_bytes = 0;  ///< Of variables of each lane, on stack or heap.
     std::uint64_t stack_bytes = 0;             ///< Of variables, all together.
     bool has_side_effects = false;             ///< Some store, atomic or image store was emitted.
     llvm::AllocaInst* trace_lane = nullptr;

@@ -79,7 +79,10 @@ class InliningPlan {
                 default: break;
             }
         }
-        for (const std::uint32_t id : order_) require_inlining(functions_[id]);
+        order_by_calls();
+        // Whoever calls a function that must be inlined must be inlined as well.
+        for (FunctionSize* const at : callees_first_)
+            for (const std::uint32_t callee : at->callees) at->must_inline = at->must_inline || functions_[callee].must_inline;
         for (const std::uint32_t id : entries) functions_[id].is_entry = true;
         for (const std::uint32_t id : order_)
             for (const std::uint32_t callee : functions_[id].callees) ++functions_[callee].calls;
@@ -114,35 +117,45 @@ class InliningPlan {
         std::uint64_t inlined = 0;
         std::uint32_t calls = 0;  ///< Places from which it is called.
         std::vector<std::uint32_t> callees;
-        bool is_entry = false, must_inline = false, is_kept = false, is_known = false;
+        bool is_entry = false, must_inline = false, is_kept = false, is_ordered = false;
     };
 
-    /// Whoever calls a function that must be inlined must be inlined as well. Call graphs have no cycles.
-    void require_inlining(FunctionSize& function) {
-        if (function.is_known) return;
-        function.is_known = true;
-        for (const std::uint32_t callee : function.callees) {
-            require_inlining(functions_[callee]);
-            function.must_inline = function.must_inline || functions_[callee].must_inline;
+    /// Without recursion of its own, since calls may be as deep as there are functions. What an entry point reaches has no cycles;
+    /// in what none reaches a cycle is cut somewhere.
+    void order_by_calls() {
+        for (const std::uint32_t id : order_) {
+            std::vector<std::pair<FunctionSize*, std::size_t>> path{{&functions_[id], 0}};
+            while (!path.empty()) {
+                auto& [function, next] = path.back();
+                if (next == 0 && function->is_ordered) {
+                    path.pop_back();
+                } else if (next < function->callees.size()) {
+                    function->is_ordered = true;
+                    FunctionSize* const callee = &functions_[function->callees[next++]];
+                    if (!callee->is_ordered) path.emplace_back(callee, 0);
+                } else {
+                    function->is_ordered = true;
+                    callees_first_.push_back(function);
+                    path.pop_back();
+                }
+            }
         }
     }
-    std::uint64_t inlined_size(FunctionSize& function, std::uint64_t kept_size) {
+    void find_inlined_size(FunctionSize& function, std::uint64_t kept_size) {
         constexpr std::uint64_t limit = std::uint64_t{1} << 40;
-        if (function.inlined) return function.inlined;
         std::uint64_t size = function.own;
         for (const std::uint32_t callee : function.callees) {
-            FunctionSize& called = functions_[callee];
-            const std::uint64_t its_size = inlined_size(called, kept_size);
-            size = std::min(limit, size + (called.is_kept ? 1 : its_size));
+            const FunctionSize& called = functions_[callee];
+            size = std::min(limit, size + (called.is_kept ? 1 : called.inlined));
         }
         function.is_kept = !function.is_entry && !function.must_inline && function.calls > 1 && size >= kept_size;
-        return function.inlined = std::max<std::uint64_t>(size, 1);
+        function.inlined = std::max<std::uint64_t>(size, 1);
     }
     std::uint64_t total(std::uint64_t kept_size) {
-        for (auto& [id, function] : functions_) function.inlined = 0;
+        for (FunctionSize* const at : callees_first_) find_inlined_size(*at, kept_size);
         std::uint64_t sum = 0;
         for (const std::uint32_t id : order_) {
-            const std::uint64_t size = inlined_size(functions_[id], kept_size);
+            const std::uint64_t size = functions_[id].inlined;
             if (functions_[id].is_kept) sum += size;
             if (functions_[id].is_entry) largest_entry_ = std::max(largest_entry_, size);
         }
@@ -151,6 +164,7 @@ class InliningPlan {
 
     std::unordered_map<std::uint32_t, FunctionSize> functions_;
     std::vector<std::uint32_t> order_;
+    std::vector<FunctionSize*> callees_first_;
     bool has_variable_pointers_ = false;
     std::uint64_t instructions_ = 0, largest_entry_ = 0, own_instructions_ = 0, own_blocks_ = 0;
 };

@@ -17,9 +17,6 @@ namespace {
 
 using spv::Op;
 
-/// Scalars that one value may have; larger ones would exhaust memory as registers.
-constexpr std::uint32_t max_components = 1u << 22;
-
 struct Decorations {
     std::optional<spv::BuiltIn> builtin;
     std::optional<std::uint32_t> set, binding, location, spec_id;
@@ -196,7 +193,12 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
         if (has_type) instruction.type = at.operand(first++);
         if (has_result) instruction.result = at.operand(first++);
         instruction.operands = at.words.subspan(std::min(first + 1, at.words.size()));
-        if (instruction.result && instruction.type) module.result_types_[instruction.result] = instruction.type;
+        if (instruction.result && instruction.type) {
+            module.result_types_[instruction.result] = instruction.type;
+            if (const auto made = module.types_.find(instruction.type); made != module.types_.end() && made->second.components > max_components)
+                return unsupported(fmt::format("word {}: a value of {} scalars", at.offset, made->second.components),
+                                   fmt::format("At most {} are possible; load a part.", max_components));
+        }
 
         switch (op) {
             case Op::OpName: names[at.operand(0)] = at.text(1); continue;
@@ -340,7 +342,10 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
                 variable.flat = from.flat, variable.no_perspective = from.no_perspective;
                 variable.centroid = from.centroid, variable.sample = from.sample;
                 if (const auto found = names.find(instruction.result); found != names.end()) variable.name = found->second;
-                if (module.type(variable.type).components > max_components)
+                // Of buffers only what is loaded takes registers.
+                const bool is_buffer = variable.storage == spv::StorageClass::StorageBuffer || variable.storage == spv::StorageClass::Uniform ||
+                                       variable.storage == spv::StorageClass::PushConstant;
+                if (!is_buffer && module.type(variable.type).components > max_components)
                     return unsupported(fmt::format("word {}: variable '{}' holds {} scalars", at.offset, variable.name,
                                                    module.type(variable.type).components),
                                        fmt::format("At most {} fit into a variable; use a storage buffer.", max_components));

@@ -122,6 +122,9 @@ struct Variable {
 /// Everything about one entry point. Spans point into the words that it was parsed from, which must outlive it.
 class Module {
   public:
+    /// Scalars that one value may have; larger ones would exhaust memory as registers.
+    static constexpr std::uint32_t max_components = 1u << 22;
+
     static Expected<Module> parse(std::span<const std::uint32_t> words, std::string_view entry_point,
                                   spv::ExecutionModel model, std::string_view name);
 

@@ -326,6 +326,14 @@ NACRE_LANES_INLINE void store_some4(void* to, Int4 value, std::uint32_t mask) {
     store4(to, value ^ ((value ^ old) & kept));
 #endif
 }
+/// Lane i of the result is lane order[i] of the value; the order has numbers from 0 to 3.
+NACRE_LANES_INLINE Int4 shuffled(Int4 value, Int4 order) {
+#if defined(__clang__)
+    return Int4{value[order[0]], value[order[1]], value[order[2]], value[order[3]]};
+#else
+    return __builtin_shuffle(value, order);
+#endif
+}
 /// Past the caches, which need not read the rest of the line then; seen by others after `end_streams`. Aligned to 16
 /// bytes.
 NACRE_LANES_INLINE void stream4(void* to, Int4 value) {

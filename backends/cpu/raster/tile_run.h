@@ -433,7 +433,7 @@ struct TileRun {
             (pixels << static_cast<int>(Stream::live_shift)) + (static_cast<std::int32_t>(place) + Int4{0, 4, 8, 12});
         const std::uint32_t any = (live | live >> 1 | live >> 2 | live >> 3) & 0x1111;
         const std::uint32_t used = (any | any >> 3 | any >> 6 | any >> 9) & 15;
-        store4(stream.places + stream.quads, __builtin_shuffle(entries, load4(quad_order[used])));
+        store4(stream.places + stream.quads, shuffled(entries, load4(quad_order[used])));
         stream.quads += static_cast<std::uint32_t>(__builtin_popcount(used));
         return used;
     }
