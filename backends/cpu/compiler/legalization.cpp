@@ -212,7 +212,9 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
                     "Call functions with barriers less often, or use another backend.");
     std::vector<std::uint32_t> planned(words.begin(), words.end());
     plan.apply(planned, options.inlines_all);
-    optimizer.RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
+    // Dead branches first: the pass against dead code crashes on unreachable blocks behind a loop without end.
+    optimizer.RegisterPass(spvtools::CreateDeadBranchElimPass())
+        .RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
         .RegisterPass(spvtools::CreateInlineExhaustivePass())
         .RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
         .RegisterPass(spvtools::CreatePrivateToLocalPass());

@@ -321,6 +321,39 @@ TEST_P(HostileInput, EnormousNumbersOfEverything) {
     ends_well(head() + main_of(cases + "\n" + blocks + "%merge = OpLabel\n"));
 }
 
+// What lies behind a loop that is never left cannot be reached, and a pass of SPIRV-Tools against dead code crashes on it.
+TEST_P(HostileInput, BlocksBehindALoopWithoutEndMayBeUnreachable) {
+    EXPECT_EQ(run(assemble(head() + main_of(R"(
+        OpBranch %start
+        %start = OpLabel
+        OpLoopMerge %after %next None
+        OpBranch %middle
+        %dead = OpLabel
+        %more = OpINotEqual %bool %id %c7
+        OpBranchConditional %more %live %after
+        %live = OpLabel
+        %odd = OpULessThan %bool %id %c7
+        OpSelectionMerge %join None
+        OpBranchConditional %odd %middle %join
+        %middle = OpLabel
+        OpStore %place %c7
+        OpBranch %join
+        %join = OpLabel
+        OpBranch %next
+        %next = OpLabel
+        OpBranch %start
+        %after = OpLabel
+        %last = OpULessThan %bool %id %c1
+        OpSelectionMerge %end None
+        OpBranchConditional %odd %then %end
+        %then = OpLabel
+        OpStore %place %c1
+        OpBranch %end
+        %end = OpLabel
+    )"))),
+              Outcome::lost) << reason();
+}
+
 TEST_P(HostileInput, RecursionIsAnError) {
     const std::string direct = R"(
         %f = OpFunction %uint None %number_type
