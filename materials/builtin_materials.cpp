@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/builtin_materials.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <limits>
 #include <numbers>
 
@@ -215,8 +216,8 @@ Expected<Tree> make_builtin_material(std::string_view name) {
         }
         names.push_back(entry.material.name);
     }
-    return fail(ErrorCode::not_found, "make material", fmt::format("'{}'", name), "there is no built-in material of this name",
-                fmt::format("The names are {}.", fmt::join(names, ", ")));
+    return fail(ErrorCode::not_found, "make material", fmt::format("'{}'", name),
+                "there is no built-in material of this name", fmt::format("The names are {}.", fmt::join(names, ", ")));
 }
 
 }  // namespace nacre::materials

@@ -61,7 +61,8 @@ class Builder {
         return unit(material_.specular_glossiness ? material_.specular_glossiness->diffuse.a : material_.base_color.a);
     }
     const TextureReference& alpha_texture() const {
-        return material_.specular_glossiness ? material_.specular_glossiness->diffuse_texture : material_.base_color_texture;
+        return material_.specular_glossiness ? material_.specular_glossiness->diffuse_texture
+                                             : material_.base_color_texture;
     }
     glm::vec3 base_color() const { return unit(glm::vec3(material_.base_color)); }
 
@@ -115,8 +116,11 @@ class Builder {
             const float glossiness = unit(material_.specular_glossiness->glossiness);
             if (material_.specular_glossiness->specular_glossiness_texture.present()) {
                 tree_.nodes[node].slab.roughness = 1.0f;
-                texture_on(node, {.field = "roughness", .texture = material_.specular_glossiness->specular_glossiness_texture,
-                                  .channel = 3, .scale = -glossiness, .bias = 1.0f});
+                texture_on(node, {.field = "roughness",
+                                  .texture = material_.specular_glossiness->specular_glossiness_texture,
+                                  .channel = 3,
+                                  .scale = -glossiness,
+                                  .bias = 1.0f});
             }
         } else {
             texture_on(node, {.field = "roughness", .texture = material_.metallic_roughness_texture, .channel = 1});
@@ -129,10 +133,14 @@ class Builder {
         }
         if ((slab.features & slab_thin_film) != 0 && material_.iridescence->thickness_maximum > 0.0f) {
             const float least = material_.iridescence->thickness_minimum / material_.iridescence->thickness_maximum;
-            texture_on(node, {.field = "film_thickness", .texture = material_.iridescence->thickness_texture, .channel = 1,
-                              .scale = 1.0f - least, .bias = least});
+            texture_on(node, {.field = "film_thickness",
+                              .texture = material_.iridescence->thickness_texture,
+                              .channel = 1,
+                              .scale = 1.0f - least,
+                              .bias = least});
         }
-        if ((slab.features & slab_emission) != 0) texture_on(node, {.field = "emission", .texture = material_.emissive_texture});
+        if ((slab.features & slab_emission) != 0)
+            texture_on(node, {.field = "emission", .texture = material_.emissive_texture});
         return node;
     }
 
@@ -194,7 +202,8 @@ class Builder {
             glass.albedo = glm::vec3(0.0f);
             if (material_.volume && material_.volume->thickness > 0.0f) {
                 glass.thickness = material_.volume->thickness;
-                glass.mean_free_path = mean_free_path_of(unit(material_.volume->attenuation_color), material_.volume->attenuation_distance);
+                glass.mean_free_path = mean_free_path_of(unit(material_.volume->attenuation_color),
+                                                         material_.volume->attenuation_distance);
             } else {
                 tree_.thin = true;
                 glass.thickness = tree_.surface_thickness;

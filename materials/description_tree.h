@@ -13,15 +13,16 @@ namespace nacre::materials {
 
 /// The tree that shades what `material` says; it is valid for any input (values out of range are clamped).
 ///
-/// A metal and a dielectric are mixed by metallic, their parameters blended to one slab as glTF's own model does. On it:
-/// sheen is fuzz, anisotropy is converted by widths (alpha along the tangent is mix(alpha, 1, strength^2), across it alpha:
-/// Kulla-Conty's roughness and anisotropy with the same two widths), iridescence is a thin film, transmission mixes in a
-/// slab with a medium (of the volume, or thin and tinted by the base color), emission leaves below the coat, a clear coat
-/// lies above with normals of its own, alpha is coverage.
+/// A metal and a dielectric are mixed by metallic, their parameters blended to one slab as glTF's own model does. On
+/// it: sheen is fuzz, anisotropy is converted by widths (alpha along the tangent is mix(alpha, 1, strength^2), across
+/// it alpha: Kulla-Conty's roughness and anisotropy with the same two widths), iridescence is a thin film, transmission
+/// mixes in a slab with a medium (of the volume, or thin and tinted by the base color), emission leaves below the coat,
+/// a clear coat lies above with normals of its own, alpha is coverage.
 ///
-/// What glTF has and slabs do not: reflection that fades at grazing angles (KHR_materials_specular with a factor below 1
-/// darkens F0 only, and its strength texture is not read), dispersion, occlusion (the renderer's). Textures of anisotropy strength and of roughness multiply the
-/// converted values, which is exact where the strength is 0 or the texture white.
+/// What glTF has and slabs do not: reflection that fades at grazing angles (KHR_materials_specular with a factor below
+/// 1 darkens F0 only, and its strength texture is not read), dispersion, occlusion (the renderer's). Textures of
+/// anisotropy strength and of roughness multiply the converted values, which is exact where the strength is 0 or the
+/// texture white.
 [[nodiscard]] Tree tree_of(const MaterialDescription& material);
 
 }  // namespace nacre::materials

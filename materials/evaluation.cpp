@@ -52,26 +52,40 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
                 slabs[step.result] = slabs[step.a];
                 slabs[step.result].coverage *= amount;
                 break;
-            case StepKind::mix_slabs: slabs[step.result] = library.mix_slabs(slabs[step.a], slabs[step.b], amount); break;
+            case StepKind::mix_slabs:
+                slabs[step.result] = library.mix_slabs(slabs[step.a], slabs[step.b], amount);
+                break;
             case StepKind::layer_slabs:
-                slabs[step.result] = library.layer_slabs(slabs[step.a], slabs[step.b], matters[step.c], matters[step.d]);
+                slabs[step.result] =
+                    library.layer_slabs(slabs[step.a], slabs[step.b], matters[step.c], matters[step.d]);
                 break;
             case StepKind::slab_spread: spreads[step.result] = library.slab_spread(slabs[step.a], view.z); break;
             case StepKind::cover_spread: spreads[step.result] = library.cover_spread(spreads[step.a], amount); break;
-            case StepKind::mix_spread: spreads[step.result] = library.mix_spread(spreads[step.a], spreads[step.b], amount); break;
-            case StepKind::layer_spread: spreads[step.result] = library.layer_spread(spreads[step.a], spreads[step.b]); break;
+            case StepKind::mix_spread:
+                spreads[step.result] = library.mix_spread(spreads[step.a], spreads[step.b], amount);
+                break;
+            case StepKind::layer_spread:
+                spreads[step.result] = library.layer_spread(spreads[step.a], spreads[step.b]);
+                break;
             case StepKind::variance_below:
                 variances[step.result] = library.variance_below(variances[step.a], spreads[step.b]);
                 break;
             case StepKind::track_slab: slabs[step.result] = library.track_slab(slabs[step.a], variances[step.b]); break;
             case StepKind::slab_matter:
-                matters[step.result] = library.slab_matter(slabs[step.a], library.prepare_closure(slabs[step.a], view, footprint));
+                matters[step.result] =
+                    library.slab_matter(slabs[step.a], library.prepare_closure(slabs[step.a], view, footprint));
                 break;
             case StepKind::base_matter: matters[step.result] = library.base_matter(slabs[step.a], view.z); break;
             case StepKind::cover_matter: matters[step.result] = library.cover_matter(matters[step.a], amount); break;
-            case StepKind::mix_matter: matters[step.result] = library.mix_matter(matters[step.a], matters[step.b], amount); break;
-            case StepKind::layer_matter: matters[step.result] = library.layer_matter(matters[step.a], matters[step.b]); break;
-            case StepKind::path_through_mix: paths[step.result] = library.path_through_mix(paths[step.a], amount); break;
+            case StepKind::mix_matter:
+                matters[step.result] = library.mix_matter(matters[step.a], matters[step.b], amount);
+                break;
+            case StepKind::layer_matter:
+                matters[step.result] = library.layer_matter(matters[step.a], matters[step.b]);
+                break;
+            case StepKind::path_through_mix:
+                paths[step.result] = library.path_through_mix(paths[step.a], amount);
+                break;
             case StepKind::path_through_layer:
                 paths[step.result] = library.path_through_layer(paths[step.a], matters[step.b], matters[step.c].albedo);
                 break;

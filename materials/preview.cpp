@@ -84,16 +84,18 @@ glm::dvec3 ambient_sky(const glm::dvec3& direction) {
                     : glm::mix(glm::dvec3(0.75, 0.78, 0.82), glm::dvec3(0.25, 0.38, 0.65), smooth(0.4, 1.0, up));
 }
 
-// What a closure sends to the view. The sky is sampled by the closure, the soft box by both, weighed by their densities (Veach
-// 1997, the balance heuristic).
+// What a closure sends to the view. The sky is sampled by the closure, the soft box by both, weighed by their densities
+// (Veach 1997, the balance heuristic).
 glm::dvec3 radiance_of(const ShadedClosure& c, const Frame& frame, std::uint32_t x, std::uint32_t y) {
     Library library;
     constexpr double count = strata * strata, box_count = box_strata * box_strata;
     glm::dvec3 sum(0.0);
     for (int i = 0; i < strata * strata; ++i) {
-        const auto stratified = [&](double at, std::uint32_t dimension) { return std::fmod(at + number_of(x, y, dimension), 1.0); };
-        const glm::dvec3 random(stratified((i + 0.5) * 0.6180339887498949, 0), stratified((i % strata + 0.5) / strata, 1),
-                                stratified((i / strata + 0.5) / strata, 2));
+        const auto stratified = [&](double at, std::uint32_t dimension) {
+            return std::fmod(at + number_of(x, y, dimension), 1.0);
+        };
+        const glm::dvec3 random(stratified((i + 0.5) * 0.6180339887498949, 0),
+                                stratified((i % strata + 0.5) / strata, 1), stratified((i / strata + 0.5) / strata, 2));
         const Library::ClosureSample sample = library.sample_closure(c.closure, random);
         if (sample.pdf <= 0.0 || sample.direction.z <= 0.0) continue;
         const glm::dvec3 direction = frame.to_world(turned(sample.direction, c.rotation));
@@ -109,12 +111,14 @@ glm::dvec3 radiance_of(const ShadedClosure& c, const Frame& frame, std::uint32_t
         if (light.z <= 0.0) continue;
         const Library::ClosureValue value = library.evaluate_closure(c.closure, light);
         sum += (value.specular + value.diffuse + value.subsurface) * library.top_transmittance(c.path, light.z) *
-               soft_box.radiance(direction) / (box_count * soft_box.density(direction) + count * library.closure_pdf(c.closure, light));
+               soft_box.radiance(direction) /
+               (box_count * soft_box.density(direction) + count * library.closure_pdf(c.closure, light));
     }
     return sum;
 }
 
-glm::dvec3 radiance(const FlattenedTree& tree, const glm::dvec3& normal, double footprint, std::uint32_t x, std::uint32_t y) {
+glm::dvec3 radiance(const FlattenedTree& tree, const glm::dvec3& normal, double footprint, std::uint32_t x,
+                    std::uint32_t y) {
     Library library;
     const Frame frame = frame_at(normal);
     const ShadedTree shaded = shade(tree, frame.to_local({0, 0, 1}), footprint);
@@ -147,7 +151,8 @@ Image preview_ball(const FlattenedTree& tree, std::uint32_t size) {
                     color = radiance(tree, normal, ball_diameter / size / std::max(normal.z, 0.05), x, y);
                 }
                 for (int channel = 0; channel < 3; ++channel)
-                    image.texel(x, y)[channel] = static_cast<float>(std::min(color[channel] / (1.0 + color[channel] * 0.25), 1.0));
+                    image.texel(x, y)[channel] =
+                        static_cast<float>(std::min(color[channel] / (1.0 + color[channel] * 0.25), 1.0));
             }
         }
     };

@@ -13,8 +13,8 @@
 
 namespace nacre::materials {
 
-/// A ball of 0.1 m under a sky with a soft box, seen from far away; linear, RGB, tone mapped to [0, 1] by x / (1 + x / 4).
-/// The same for the same tree on every machine. Uses all threads.
+/// A ball of 0.1 m under a sky with a soft box, seen from far away; linear, RGB, tone mapped to [0, 1] by x / (1 + x /
+/// 4). The same for the same tree on every machine. Uses all threads.
 [[nodiscard]] Image preview_ball(const FlattenedTree& tree, std::uint32_t size);
 
 /// Radiance of the preview's sky, W/sr/m2. `direction`: unit, y up, z towards the viewer.

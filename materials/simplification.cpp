@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/simplification.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <numbers>
 #include <optional>
 
@@ -36,7 +37,7 @@ glm::dvec3 view_of(int i) {
 }
 
 struct Appearance {
-    std::vector<glm::dvec3> albedo;               // for each view
+    std::vector<glm::dvec3> albedo;              // for each view
     std::vector<std::vector<glm::dvec3>> lobes;  // for each view and light
 };
 
@@ -98,9 +99,11 @@ std::optional<NodeIndex> next_operator(const Tree& tree) {
         if (node.kind != NodeKind::coverage) open.push_back({node.second, at.depth + 1});
     }
     if (candidates.empty()) return std::nullopt;
-    return std::ranges::max_element(candidates, [](const Candidate& a, const Candidate& b) {
-               return a.depth != b.depth ? a.depth < b.depth : a.is_mix < b.is_mix;
-           })->node;
+    return std::ranges::max_element(candidates,
+                                    [](const Candidate& a, const Candidate& b) {
+                                        return a.depth != b.depth ? a.depth < b.depth : a.is_mix < b.is_mix;
+                                    })
+        ->node;
 }
 
 Expected<Simplification> run(const Tree& tree, const MaterialBudget& budget) {
@@ -112,8 +115,10 @@ Expected<Simplification> run(const Tree& tree, const MaterialBudget& budget) {
         step.closures = static_cast<std::uint32_t>(flat.topology.closures.size());
         step.bytes = storage_layout(flat).total_bytes();
         step.albedo_error = step.lobe_error = 0.0;
-        if (original) measure(step, *original, flat);
-        else original = appearance_of(flat);
+        if (original)
+            measure(step, *original, flat);
+        else
+            original = appearance_of(flat);
         result.steps.push_back(step);
         return step.closures <= budget.closures && step.bytes <= budget.bytes;
     };

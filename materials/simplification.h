@@ -9,8 +9,9 @@
 #include "materials/topology.h"
 
 /// @file
-/// Makes a material cheaper until it fits a budget: first operators become one slab by blending parameters, the deepest first
-/// and of equally deep ones mixes before layers; then features are switched off in the order of simplification_rules().
+/// Makes a material cheaper until it fits a budget: first operators become one slab by blending parameters, the deepest
+/// first and of equally deep ones mixes before layers; then features are switched off in the order of
+/// simplification_rules().
 ///
 ///     NACRE_TRY(const Simplification simple, simplify(tree, {.closures = 1, .bytes = 12}));
 ///     for (const SimplificationStep& step : simple.steps) ...   // the first is the material as it was
@@ -23,8 +24,8 @@ struct MaterialBudget {
     std::uint32_t bytes = ~0u;  ///< StorageLayout::total_bytes().
 };
 
-/// One of the things that simplification can do, as data. Rules are tried from the first; one that applies is used as often as
-/// it does before the next is tried.
+/// One of the things that simplification can do, as data. Rules are tried from the first; one that applies is used as
+/// often as it does before the next is tried.
 struct SimplificationRule {
     enum class Kind : std::uint8_t {
         blend,         ///< Before: an operator over two slabs. After: one slab with both's features.
@@ -46,7 +47,8 @@ struct SimplificationStep {
     FlattenDesc flatten;
     std::uint32_t closures = 0;
     std::uint32_t bytes = 0;
-    /// Mean absolute difference from the material as it was in directional albedo, over views from 0 to 87 degrees and channels.
+    /// Mean absolute difference from the material as it was in directional albedo, over views from 0 to 87 degrees and
+    /// channels.
     double albedo_error = 0.0;
     /// Distance of the lobes: integral of the absolute difference over light directions relative to the integral of the
     /// material as it was, 0 to 2, mean over the same views.

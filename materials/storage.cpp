@@ -95,7 +95,8 @@ class Layout {
         add("f0", color_bits);
         if (!is_without_diffuse(closure.node)) add("albedo", color_bits);
         // The first closure's roughness lies in the word of the top layer.
-        if (!(closure.is_top && std::ranges::find_if(topology_.closures, &TopologyClosure::is_top) - topology_.closures.begin() == index))
+        if (!(closure.is_top &&
+              std::ranges::find_if(topology_.closures, &TopologyClosure::is_top) - topology_.closures.begin() == index))
             add("roughness", 8);
         for (const FeatureField& field : feature_fields) {
             if ((closure.features & field.feature) != 0) add(field.name, field.bits);
@@ -107,8 +108,8 @@ class Layout {
                 add("medium transmittance", color_bits);
             }
         }
-        // Coverage and mixing weigh all channels alike; only what lies under a layer is tinted. A lone closure's coverage is
-        // the pixel's.
+        // Coverage and mixing weigh all channels alike; only what lies under a layer is tinted. A lone closure's
+        // coverage is the pixel's.
         if (closure.is_top) {
             if (!is_single) add("weight", 8);
         } else {

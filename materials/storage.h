@@ -9,8 +9,8 @@
 #include "materials/topology.h"
 
 /// @file
-/// What a material takes in the G-buffer, in the worst case over all pixels: the fields of its header and closures, known from
-/// its topology and features alone.
+/// What a material takes in the G-buffer, in the worst case over all pixels: the fields of its header and closures,
+/// known from its topology and features alone.
 ///
 ///     const StorageLayout layout = storage_layout(flat);
 ///     layout.total_bytes();   // 12 for one slab without features
@@ -35,8 +35,8 @@ struct StorageField {
     std::uint32_t bits;
 };
 
-/// Material words hold `fields` one after another; the top layer's word (normal and roughness) and the word of subsurface
-/// scattering lie apart, since other passes read them alone.
+/// Material words hold `fields` one after another; the top layer's word (normal and roughness) and the word of
+/// subsurface scattering lie apart, since other passes read them alone.
 struct StorageLayout {
     static constexpr std::uint32_t no_closure = ~0u;
 

@@ -29,8 +29,8 @@ class Flattener {
     enum class Need { base, all };
 
     struct NodeState {
-        bool is_one_slab = false;           // a leaf, or blended to one
-        std::uint32_t slab = Step::none;    // register, where it is one
+        bool is_one_slab = false;         // a leaf, or blended to one
+        std::uint32_t slab = Step::none;  // register, where it is one
         std::uint32_t base_matter = Step::none, matter = Step::none, spread = Step::none;
         std::uint32_t amount = Step::none;  // index into Topology::amounts
         std::uint32_t features = 0;
@@ -70,8 +70,9 @@ class Flattener {
             state.features = node.slab.features & ~(desc_.dropped_features & ~slab_medium);
             topology_.features |= state.features;
             state.frame = node.frame;
-            state.slab = step({.kind = StepKind::read_slab, .a = static_cast<std::uint32_t>(topology_.slabs.size() - 1)},
-                              topology_.slab_registers);
+            state.slab =
+                step({.kind = StepKind::read_slab, .a = static_cast<std::uint32_t>(topology_.slabs.size() - 1)},
+                     topology_.slab_registers);
             return;
         }
         gather(node.first);
@@ -86,17 +87,25 @@ class Flattener {
         state.frame = first.frame;
         switch (node.kind) {
             case NodeKind::coverage:
-                state.slab = step({.kind = StepKind::cover_slab, .a = first.slab, .amount = state.amount}, topology_.slab_registers);
+                state.slab = step({.kind = StepKind::cover_slab, .a = first.slab, .amount = state.amount},
+                                  topology_.slab_registers);
                 break;
             case NodeKind::mix:
                 state.features |= nodes_[node.second].features;
-                state.slab = step({.kind = StepKind::mix_slabs, .a = first.slab, .b = nodes_[node.second].slab, .amount = state.amount},
+                state.slab = step({.kind = StepKind::mix_slabs,
+                                   .a = first.slab,
+                                   .b = nodes_[node.second].slab,
+                                   .amount = state.amount},
                                   topology_.slab_registers);
                 break;
             case NodeKind::layer: {
                 state.features |= nodes_[node.second].features;
                 const std::uint32_t top = matter(node.first, Need::all), base = matter(node.second, Need::base);
-                state.slab = step({.kind = StepKind::layer_slabs, .a = first.slab, .b = nodes_[node.second].slab, .c = top, .d = base},
+                state.slab = step({.kind = StepKind::layer_slabs,
+                                   .a = first.slab,
+                                   .b = nodes_[node.second].slab,
+                                   .c = top,
+                                   .d = base},
                                   topology_.slab_registers);
                 break;
             }
@@ -109,16 +118,22 @@ class Flattener {
         NodeState& state = nodes_[index];
         if (state.spread != Step::none) return state.spread;
         Step made{};
-        if (state.is_one_slab) made = {.kind = StepKind::slab_spread, .a = state.slab};
-        else if (node.kind == NodeKind::coverage) made = {.kind = StepKind::cover_spread, .a = spread(node.first), .amount = state.amount};
+        if (state.is_one_slab)
+            made = {.kind = StepKind::slab_spread, .a = state.slab};
+        else if (node.kind == NodeKind::coverage)
+            made = {.kind = StepKind::cover_spread, .a = spread(node.first), .amount = state.amount};
         else if (node.kind == NodeKind::mix)
-            made = {.kind = StepKind::mix_spread, .a = spread(node.first), .b = spread(node.second), .amount = state.amount};
-        else made = {.kind = StepKind::layer_spread, .a = spread(node.first), .b = spread(node.second)};
+            made = {.kind = StepKind::mix_spread,
+                    .a = spread(node.first),
+                    .b = spread(node.second),
+                    .amount = state.amount};
+        else
+            made = {.kind = StepKind::layer_spread, .a = spread(node.first), .b = spread(node.second)};
         return state.spread = step(made, topology_.spread_registers);
     }
 
-    // From the root: slabs below a layer are rougher. Closures are made of what this leaves, so that what they reflect and what
-    // they let through are of one kind.
+    // From the root: slabs below a layer are rougher. Closures are made of what this leaves, so that what they reflect
+    // and what they let through are of one kind.
     void track(NodeIndex index, std::uint32_t variance, bool is_bottom) {
         const Node& node = tree_.nodes[index];
         NodeState& state = nodes_[index];
@@ -132,7 +147,8 @@ class Flattener {
         track(node.first, variance, is_bottom && node.kind != NodeKind::layer);
         if (node.kind == NodeKind::coverage) return;
         if (node.kind == NodeKind::layer)
-            variance = step({.kind = StepKind::variance_below, .a = variance, .b = spread(node.first)}, topology_.variance_registers);
+            variance = step({.kind = StepKind::variance_below, .a = variance, .b = spread(node.first)},
+                            topology_.variance_registers);
         track(node.second, variance, is_bottom);
     }
 
@@ -148,7 +164,9 @@ class Flattener {
         } else if (node.kind == NodeKind::coverage) {
             made = {.kind = StepKind::cover_matter, .a = matter(node.first, need), .amount = state.amount};
         } else if (node.kind == NodeKind::mix) {
-            made = {.kind = StepKind::mix_matter, .a = matter(node.first, need), .b = matter(node.second, need),
+            made = {.kind = StepKind::mix_matter,
+                    .a = matter(node.first, need),
+                    .b = matter(node.second, need),
                     .amount = state.amount};
         } else {
             made = {.kind = StepKind::layer_matter, .a = matter(node.first, Need::all), .b = matter(node.second, need)};
@@ -167,7 +185,9 @@ class Flattener {
                 return step({.kind = StepKind::cover_matter, .a = top_matter(node.first), .amount = state.amount},
                             topology_.matter_registers);
             case NodeKind::mix:
-                return step({.kind = StepKind::mix_matter, .a = top_matter(node.first), .b = top_matter(node.second),
+                return step({.kind = StepKind::mix_matter,
+                             .a = top_matter(node.first),
+                             .b = top_matter(node.second),
                              .amount = state.amount},
                             topology_.matter_registers);
             case NodeKind::slab: break;
@@ -192,26 +212,30 @@ class Flattener {
         switch (node.kind) {
             case NodeKind::slab: break;
             case NodeKind::coverage:
-                hand_down(node.first, step({.kind = StepKind::path_through_mix, .a = path, .amount = state.amount}, topology_.path_registers),
+                hand_down(node.first,
+                          step({.kind = StepKind::path_through_mix, .a = path, .amount = state.amount},
+                               topology_.path_registers),
                           below, is_top, is_bottom);
                 break;
             case NodeKind::mix: {
-                const std::uint32_t first = step(
-                    {.kind = StepKind::path_through_mix, .a = path, .amount = state.amount, .complement = true}, topology_.path_registers);
+                const std::uint32_t first =
+                    step({.kind = StepKind::path_through_mix, .a = path, .amount = state.amount, .complement = true},
+                         topology_.path_registers);
                 hand_down(node.first, first, below, is_top, is_bottom);
-                const std::uint32_t second =
-                    step({.kind = StepKind::path_through_mix, .a = path, .amount = state.amount}, topology_.path_registers);
+                const std::uint32_t second = step(
+                    {.kind = StepKind::path_through_mix, .a = path, .amount = state.amount}, topology_.path_registers);
                 hand_down(node.second, second, below, is_top, is_bottom);
                 break;
             }
             case NodeKind::layer: {
                 std::uint32_t ground = matter(node.second, below == Step::none ? Need::base : Need::all);
                 if (below != Step::none)
-                    ground = step({.kind = StepKind::layer_matter, .a = ground, .b = below}, topology_.matter_registers);
+                    ground =
+                        step({.kind = StepKind::layer_matter, .a = ground, .b = below}, topology_.matter_registers);
                 hand_down(node.first, path, ground, is_top, false);
-                const std::uint32_t under =
-                    step({.kind = StepKind::path_through_layer, .a = path, .b = matter(node.first, Need::all), .c = ground},
-                         topology_.path_registers);
+                const std::uint32_t under = step(
+                    {.kind = StepKind::path_through_layer, .a = path, .b = matter(node.first, Need::all), .c = ground},
+                    topology_.path_registers);
                 hand_down(node.second, under, below, false, is_bottom);
                 break;
             }

@@ -9,17 +9,17 @@
 #include "materials/tree.h"
 
 /// @file
-/// A tree flattened to straight code: which slabs are read, what is gathered from the leaves up and handed from the root down,
-/// and which closures come out. The same steps are run on the host (materials/evaluation.h) and printed as GLSL
-/// (materials/tree_shader.h), so that neither can drift from the other.
+/// A tree flattened to straight code: which slabs are read, what is gathered from the leaves up and handed from the
+/// root down, and which closures come out. The same steps are run on the host (materials/evaluation.h) and printed as
+/// GLSL (materials/tree_shader.h), so that neither can drift from the other.
 ///
 ///     NACRE_TRY(const Topology topology, flatten(tree));
 ///     topology.closures.size();  // what a pixel of this material costs at most
 
 namespace nacre::materials {
 
-/// What a step does; results and operands are registers, counted from 0 for each kind of value. The functions are those of
-/// materials/closures/operators.glsl and blending.glsl.
+/// What a step does; results and operands are registers, counted from 0 for each kind of value. The functions are those
+/// of materials/closures/operators.glsl and blending.glsl.
 enum class StepKind : std::uint8_t {
     read_slab,           ///< slab: the inputs of leaf number `a`
     cover_slab,          ///< slab: slab a with its coverage times the amount
@@ -66,9 +66,10 @@ struct TopologyClosure {
 struct Topology {
     std::vector<Step> steps;
     std::vector<TopologyClosure> closures;
-    std::vector<NodeIndex> slabs;     ///< Leaves, in the order in which they are read.
-    std::vector<NodeIndex> amounts;   ///< Operators that have an amount.
-    std::vector<float> thickness;     ///< For each of `slabs`: meters that an operator or the surface gives it, or negative.
+    std::vector<NodeIndex> slabs;    ///< Leaves, in the order in which they are read.
+    std::vector<NodeIndex> amounts;  ///< Operators that have an amount.
+    std::vector<float>
+        thickness;  ///< For each of `slabs`: meters that an operator or the surface gives it, or negative.
     std::vector<std::uint32_t> frames;  ///< Tangent frames that the closures use, each once: indices into Tree::frames.
     std::uint32_t slab_registers = 0, matter_registers = 0;
     std::uint32_t path_registers = 1;      ///< Register 0 is the open path.
@@ -84,8 +85,8 @@ struct FlattenDesc {
     std::uint32_t dropped_features = 0;  ///< Features that no closure may have.
 };
 
-/// Flattens `tree` after removing what cannot be seen (without_invisible_slabs); node indices are those of `visible_tree`.
-/// Operators with `parameter_blend` become one slab with all below them. Error: as validate().
+/// Flattens `tree` after removing what cannot be seen (without_invisible_slabs); node indices are those of
+/// `visible_tree`. Operators with `parameter_blend` become one slab with all below them. Error: as validate().
 struct FlattenedTree {
     Tree visible_tree;
     Topology topology;

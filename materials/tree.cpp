@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/tree.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 #include <utility>
 
@@ -13,16 +14,15 @@ namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-#define NACRE_NUMBER(field, feature, minimum, maximum)                     \
-    SlabField {                                                            \
-        #field, feature, 1, minimum, maximum,                              \
-            [](const Slab& slab, std::uint32_t) { return slab.field; },    \
-            [](Slab& slab, std::uint32_t, float value) { slab.field = value; } \
+#define NACRE_NUMBER(field, feature, minimum, maximum)                                                    \
+    SlabField {                                                                                           \
+        #field, feature, 1, minimum, maximum, [](const Slab& slab, std::uint32_t) { return slab.field; }, \
+            [](Slab& slab, std::uint32_t, float value) { slab.field = value; }                            \
     }
-#define NACRE_COLOR(field, feature, minimum, maximum)                                                   \
-    SlabField {                                                                                         \
-        #field, feature, 3, minimum, maximum,                                                           \
-            [](const Slab& slab, std::uint32_t channel) { return slab.field[static_cast<int>(channel)]; }, \
+#define NACRE_COLOR(field, feature, minimum, maximum)                                                             \
+    SlabField {                                                                                                   \
+        #field, feature, 3, minimum, maximum,                                                                     \
+            [](const Slab& slab, std::uint32_t channel) { return slab.field[static_cast<int>(channel)]; },        \
             [](Slab& slab, std::uint32_t channel, float value) { slab.field[static_cast<int>(channel)] = value; } \
     }
 
@@ -53,8 +53,8 @@ constexpr std::array fields{
 #undef NACRE_COLOR
 
 std::unexpected<Error> refuse(const Tree& tree, std::string_view where, std::string reason, std::string remedy) {
-    return fail(ErrorCode::invalid_argument, "check material", fmt::format("'{}'{}", tree.name, where), std::move(reason),
-                std::move(remedy));
+    return fail(ErrorCode::invalid_argument, "check material", fmt::format("'{}'{}", tree.name, where),
+                std::move(reason), std::move(remedy));
 }
 
 std::string place_of(const Tree& tree, NodeIndex index) {
@@ -88,14 +88,16 @@ Expected<void> check_slab(const Tree& tree, NodeIndex index) {
         }
     }
     if (tree.nodes[index].frame >= tree.frames.size()) {
-        return refuse(tree, place_of(tree, index),
-                      fmt::format("frame is {}, but there are {} tangent frames", tree.nodes[index].frame, tree.frames.size()),
-                      "Add the frame with add_frame().");
+        return refuse(
+            tree, place_of(tree, index),
+            fmt::format("frame is {}, but there are {} tangent frames", tree.nodes[index].frame, tree.frames.size()),
+            "Add the frame with add_frame().");
     }
     std::uint32_t known = 0;
     for (const SlabFeature& feature : slab_features()) known |= feature.bit;
     if ((slab.features & ~known) != 0) {
-        return refuse(tree, place_of(tree, index), fmt::format("features has the unknown bits {:#x}", slab.features & ~known),
+        return refuse(tree, place_of(tree, index),
+                      fmt::format("features has the unknown bits {:#x}", slab.features & ~known),
                       "Use the bits of slab_features().");
     }
     return {};
@@ -109,7 +111,8 @@ Expected<void> check_textures(const Tree& tree, NodeIndex index) {
         if (node.kind == NodeKind::slab) {
             const SlabField* field = find_slab_field(input.field);
             if (field == nullptr) {
-                return refuse(tree, place_of(tree, index), fmt::format("a texture is on '{}', which no slab has", input.field),
+                return refuse(tree, place_of(tree, index),
+                              fmt::format("a texture is on '{}', which no slab has", input.field),
                               "The names are those of slab_fields().");
             }
             if (field->feature != 0 && (node.slab.features & field->feature) == 0) {
@@ -119,14 +122,16 @@ Expected<void> check_textures(const Tree& tree, NodeIndex index) {
             }
             channels = field->channels;
         } else if (input.field != "amount" || node.kind == NodeKind::layer) {
-            return refuse(tree, place_of(tree, index),
-                          fmt::format("a texture is on '{}', which a {} does not have", input.field, name_of(node.kind)),
-                          "Mix and coverage have 'amount'; a layer has no textured input.");
+            return refuse(
+                tree, place_of(tree, index),
+                fmt::format("a texture is on '{}', which a {} does not have", input.field, name_of(node.kind)),
+                "Mix and coverage have 'amount'; a layer has no textured input.");
         }
         if (input.channel + channels > 4) {
-            return refuse(tree, place_of(tree, index),
-                          fmt::format("the texture of '{}' reads {} channels from {}", input.field, channels, input.channel),
-                          "A texture has the channels 0 to 3.");
+            return refuse(
+                tree, place_of(tree, index),
+                fmt::format("the texture of '{}' reads {} channels from {}", input.field, channels, input.channel),
+                "A texture has the channels 0 to 3.");
         }
         if (!std::isfinite(input.scale) || !std::isfinite(input.bias)) {
             return refuse(tree, place_of(tree, index), fmt::format("scale or bias of '{}' is not finite", input.field),
@@ -247,11 +252,13 @@ const SlabField* find_slab_field(std::string_view name) {
 
 Expected<void> validate(const Tree& tree) {
     if (tree.root >= tree.nodes.size()) {
-        return refuse(tree, "", fmt::format("the root is node {}, but there are {} nodes", tree.root, tree.nodes.size()),
+        return refuse(tree, "",
+                      fmt::format("the root is node {}, but there are {} nodes", tree.root, tree.nodes.size()),
                       "Add a slab; the node added last becomes the root.");
     }
     if (!in_range(tree.surface_thickness, 0.0f, infinity)) {
-        return refuse(tree, "", fmt::format("surface_thickness is {}", tree.surface_thickness), "It must be 0 m or more.");
+        return refuse(tree, "", fmt::format("surface_thickness is {}", tree.surface_thickness),
+                      "It must be 0 m or more.");
     }
     struct Step {
         NodeIndex node;
@@ -279,11 +286,13 @@ Expected<void> validate(const Tree& tree) {
             continue;
         }
         if (step.depth >= max_tree_depth) {
-            return refuse(tree, place_of(tree, step.node), fmt::format("more than {} operators lie above a slab", max_tree_depth),
+            return refuse(tree, place_of(tree, step.node),
+                          fmt::format("more than {} operators lie above a slab", max_tree_depth),
                           "Arrange the operators in a flatter tree.");
         }
         if (node.kind != NodeKind::layer && !in_range(node.amount, 0.0f, 1.0f)) {
-            return refuse(tree, place_of(tree, step.node), fmt::format("amount is {}", node.amount), "It must be in [0, 1].");
+            return refuse(tree, place_of(tree, step.node), fmt::format("amount is {}", node.amount),
+                          "It must be in [0, 1].");
         }
         // Negative means unset, but only the default does.
         if (node.kind == NodeKind::layer && node.thickness != -1.0f && !in_range(node.thickness, 0.0f, infinity)) {
@@ -293,9 +302,10 @@ Expected<void> validate(const Tree& tree) {
         const NodeIndex children[2] = {node.first, node.second};
         for (int i = 0; i < child_count(node); ++i) {
             if (children[i] >= tree.nodes.size()) {
-                return refuse(tree, place_of(tree, step.node),
-                              fmt::format("its child is node {}, but there are {} nodes", children[i], tree.nodes.size()),
-                              "Add the children before the operator.");
+                return refuse(
+                    tree, place_of(tree, step.node),
+                    fmt::format("its child is node {}, but there are {} nodes", children[i], tree.nodes.size()),
+                    "Add the children before the operator.");
             }
             open.push_back({children[i], step.depth + 1});
         }
@@ -356,7 +366,9 @@ std::string topology_text(const Tree& tree) {
             case NodeKind::slab: texts[index] = node.name.empty() ? fmt::format("slab {}", index) : node.name; break;
             case NodeKind::coverage: texts[index] = fmt::format("coverage({})", texts[node.first]); break;
             case NodeKind::mix: texts[index] = fmt::format("mix({}, {})", texts[node.first], texts[node.second]); break;
-            case NodeKind::layer: texts[index] = fmt::format("layer({}, {})", texts[node.first], texts[node.second]); break;
+            case NodeKind::layer:
+                texts[index] = fmt::format("layer({}, {})", texts[node.first], texts[node.second]);
+                break;
         }
     }
     return texts[tree.root];

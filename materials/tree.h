@@ -12,12 +12,12 @@
 #include "materials/slab.h"
 
 /// @file
-/// A material as a tree: slabs of matter as leaves, operators that arrange them as inner nodes. The way it is written by
-/// authors, importers and files (materials/tree_json.h); materials/topology.h flattens it to closures.
+/// A material as a tree: slabs of matter as leaves, operators that arrange them as inner nodes. The way it is written
+/// by authors, importers and files (materials/tree_json.h); materials/topology.h flattens it to closures.
 ///
 ///     Tree tree{.name = "lacquered gold"};
-///     const NodeIndex gold = tree.add(Slab{.f0 = {1.00f, 0.77f, 0.34f}, .roughness = 0.3f, .albedo = glm::vec3(0.0f)});
-///     const NodeIndex lacquer = tree.add(Slab{.roughness = 0.05f, .albedo = glm::vec3(0.0f)});
+///     const NodeIndex gold = tree.add(Slab{.f0 = {1.00f, 0.77f, 0.34f}, .roughness = 0.3f, .albedo =
+///     glm::vec3(0.0f)}); const NodeIndex lacquer = tree.add(Slab{.roughness = 0.05f, .albedo = glm::vec3(0.0f)});
 ///     tree.root = tree.layer(lacquer, gold, 1e-4f);
 ///     NACRE_CHECK(validate(tree));
 
@@ -40,8 +40,8 @@ struct TextureInput {
 
 /// A tangent frame for slabs that need one of their own; slabs with equal frames share one.
 struct TangentFrame {
-    TextureReference normal_texture;  ///< Tangent space normals; `scale` of the reference is that of x and y.
-    float rotation = 0.0f;            ///< Of the tangent around the normal, radians, counter-clockwise.
+    TextureReference normal_texture;    ///< Tangent space normals; `scale` of the reference is that of x and y.
+    float rotation = 0.0f;              ///< Of the tangent around the normal, radians, counter-clockwise.
     TextureReference rotation_texture;  ///< rg: direction in [-1, 1] mapped to [0, 1], turned by `rotation` as well.
 
     bool operator==(const TangentFrame&) const = default;
@@ -62,11 +62,11 @@ struct Node {
     NodeKind kind = NodeKind::slab;
     std::string name;  ///< For reports; may be empty.
 
-    Slab slab;                  ///< Leaves.
-    std::uint32_t frame = 0;    ///< Leaves: index into Tree::frames.
-    NodeIndex first = 0;        ///< Operators.
-    NodeIndex second = 0;       ///< Mix and layer.
-    float amount = 0.0f;        ///< Mix and coverage, [0, 1].
+    Slab slab;                ///< Leaves.
+    std::uint32_t frame = 0;  ///< Leaves: index into Tree::frames.
+    NodeIndex first = 0;      ///< Operators.
+    NodeIndex second = 0;     ///< Mix and layer.
+    float amount = 0.0f;      ///< Mix and coverage, [0, 1].
     /// Layer: meters of the top child; every slab in it counts as that thick. Negative: slabs keep their own thickness.
     float thickness = -1.0f;
     bool parameter_blend = false;  ///< Mix and layer: always simplified to one slab, whatever the budget.
@@ -95,12 +95,12 @@ struct Tree {
 };
 
 /// Limits of a tree that is compiled. Shaders are flattened: beyond these they would not compile in useful time.
-inline constexpr std::uint32_t max_tree_depth = 16;   ///< Operators between the root and a slab.
+inline constexpr std::uint32_t max_tree_depth = 16;  ///< Operators between the root and a slab.
 inline constexpr std::uint32_t max_tree_slabs = 32;
 
 /// Checks that `tree` is one: it has a root, every node is used once (no cycles, no sharing), indices exist, depth and
-/// number of slabs are within the limits, every number is finite and in the range that materials/slab.h states, textures
-/// name inputs that exist. Error: invalid_argument, naming tree and node.
+/// number of slabs are within the limits, every number is finite and in the range that materials/slab.h states,
+/// textures name inputs that exist. Error: invalid_argument, naming tree and node.
 [[nodiscard]] Expected<void> validate(const Tree& tree);
 
 /// One input of a slab, as files, textures and reports name it.
@@ -113,16 +113,16 @@ struct SlabField {
     void (*set)(Slab&, std::uint32_t channel, float value);
 };
 
-/// All inputs, in the order of the struct. `glint_position` and its derivatives come from texture coordinates and are not
-/// inputs; `specular_lut` is an index and not one either.
+/// All inputs, in the order of the struct. `glint_position` and its derivatives come from texture coordinates and are
+/// not inputs; `specular_lut` is an index and not one either.
 [[nodiscard]] std::span<const SlabField> slab_fields();
 
 /// By name; null where there is none.
 [[nodiscard]] const SlabField* find_slab_field(std::string_view name);
 
 /// Removes what can never be seen, without changing what is: children of a mix with amount 0 or 1 and no texture, of a
-/// coverage of 0 (replaced by a slab of coverage 0 where it is the root) or 1, everything below a layer that is opaque and
-/// covers all. Nodes that are not used any more go. The result is valid where `tree` is.
+/// coverage of 0 (replaced by a slab of coverage 0 where it is the root) or 1, everything below a layer that is opaque
+/// and covers all. Nodes that are not used any more go. The result is valid where `tree` is.
 [[nodiscard]] Tree without_invisible_slabs(const Tree& tree);
 
 /// Nodes from the leaves up (each after its children), only those below the root.

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/tree_json.h"
 
-#include <algorithm>
-#include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
 #include <initializer_list>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -26,8 +27,9 @@ class Reader {
     explicit Reader(std::string_view source) : source_(source) {}
 
     Expected<MaterialFile> file(const json& document) {
-        NACRE_CHECK(members(document, "the document",
-                            {"$schema", "nacre_material", "name", "thin", "surface_thickness", "images", "frames", "root"}));
+        NACRE_CHECK(
+            members(document, "the document",
+                    {"$schema", "nacre_material", "name", "thin", "surface_thickness", "images", "frames", "root"}));
         if (!document.contains("nacre_material") || document["nacre_material"] != 1) {
             return refuse("nacre_material", "it must be 1, the version of the format", "Write \"nacre_material\": 1.");
         }
@@ -50,7 +52,8 @@ class Reader {
         images_ = result.images.size();
         if (document.contains("frames")) {
             if (!document["frames"].is_array() || document["frames"].empty())
-                return refuse("frames", "it is no list of at least one frame", "Leave it out where all slabs share the surface's.");
+                return refuse("frames", "it is no list of at least one frame",
+                              "Leave it out where all slabs share the surface's.");
             result.tree.frames.clear();
             for (const json& frame : document["frames"]) {
                 TangentFrame read;
@@ -58,7 +61,8 @@ class Reader {
                 result.tree.frames.push_back(read);
             }
         }
-        if (!document.contains("root")) return refuse("root", "it is missing", "Write the tree's uppermost node there.");
+        if (!document.contains("root"))
+            return refuse("root", "it is missing", "Write the tree's uppermost node there.");
         NACRE_TRY(result.tree.root, node(document["root"], "root", 0, result.tree));
         if (auto valid = validate(result.tree); !valid) {
             Error error = valid.error();
@@ -69,16 +73,20 @@ class Reader {
     }
 
     std::unexpected<Error> refuse(std::string_view place, std::string reason, std::string remedy) const {
-        return fail(ErrorCode::parse, "read material", fmt::format("'{}': {}", source_, place), std::move(reason), std::move(remedy));
+        return fail(ErrorCode::parse, "read material", fmt::format("'{}': {}", source_, place), std::move(reason),
+                    std::move(remedy));
     }
 
   private:
-    Expected<void> members(const json& value, std::string_view place, std::initializer_list<std::string_view> known) const {
+    Expected<void> members(const json& value, std::string_view place,
+                           std::initializer_list<std::string_view> known) const {
         return members(value, place, std::vector<std::string_view>(known));
     }
 
-    Expected<void> members(const json& value, std::string_view place, const std::vector<std::string_view>& known) const {
-        if (!value.is_object()) return refuse(place, fmt::format("it is a {}, not an object", value.type_name()), "Write {...}.");
+    Expected<void> members(const json& value, std::string_view place,
+                           const std::vector<std::string_view>& known) const {
+        if (!value.is_object())
+            return refuse(place, fmt::format("it is a {}, not an object", value.type_name()), "Write {...}.");
         for (const auto& [key, ignored] : value.items()) {
             if (std::ranges::find(known, key) == known.end()) {
                 return refuse(place, fmt::format("it has the unknown member '{}'", key),
@@ -89,7 +97,8 @@ class Reader {
     }
 
     Expected<void> text(const json& value, std::string_view place, std::string& result) const {
-        if (!value.is_string()) return refuse(place, fmt::format("it is a {}, not a text", value.type_name()), "Write \"...\".");
+        if (!value.is_string())
+            return refuse(place, fmt::format("it is a {}, not a text", value.type_name()), "Write \"...\".");
         result = value.get<std::string>();
         return {};
     }
@@ -100,19 +109,23 @@ class Reader {
             return {};
         }
         if (!value.is_number()) {
-            return refuse(place, fmt::format("it is a {}, not a number", value.type_name()), "Write a number, or \"infinity\".");
+            return refuse(place, fmt::format("it is a {}, not a number", value.type_name()),
+                          "Write a number, or \"infinity\".");
         }
         const double wide = value.get<double>();
         if (std::abs(wide) > std::numeric_limits<float>::max()) {
-            return refuse(place, fmt::format("{} is beyond what a float holds", wide), "Write \"infinity\" where that is meant.");
+            return refuse(place, fmt::format("{} is beyond what a float holds", wide),
+                          "Write \"infinity\" where that is meant.");
         }
         result = static_cast<float>(wide);
         return {};
     }
 
     Expected<void> index(const json& value, std::string_view place, std::size_t count, int& result) const {
-        if (!value.is_number_integer() || value.get<double>() < 0 || value.get<double>() >= static_cast<double>(count)) {
-            return refuse(place, fmt::format("it is {}, not an index below {}", value.dump(), count), "Indices begin at 0.");
+        if (!value.is_number_integer() || value.get<double>() < 0 ||
+            value.get<double>() >= static_cast<double>(count)) {
+            return refuse(place, fmt::format("it is {}, not an index below {}", value.dump(), count),
+                          "Indices begin at 0.");
         }
         result = value.get<int>();
         return {};
@@ -128,12 +141,14 @@ class Reader {
             if (!value.contains(name)) return {};
             if (!value[name].is_array() || value[name].size() != 2)
                 return refuse(place + "." + name, "it is no pair", "Write [x, y].");
-            for (int i = 0; i < 2; ++i) NACRE_CHECK(number(value[name][static_cast<std::size_t>(i)], place + "." + name, target[i]));
+            for (int i = 0; i < 2; ++i)
+                NACRE_CHECK(number(value[name][static_cast<std::size_t>(i)], place + "." + name, target[i]));
             return {};
         };
         NACRE_CHECK(pair("uv_offset", result.transform.offset));
         NACRE_CHECK(pair("uv_scale", result.transform.scale));
-        if (value.contains("uv_rotation")) NACRE_CHECK(number(value["uv_rotation"], place + ".uv_rotation", result.transform.rotation));
+        if (value.contains("uv_rotation"))
+            NACRE_CHECK(number(value["uv_rotation"], place + ".uv_rotation", result.transform.rotation));
         return {};
     }
 
@@ -145,7 +160,8 @@ class Reader {
                                 {"image", "uv_set", "uv_offset", "uv_scale", "uv_rotation", "strength"}));
             NACRE_CHECK(reference(value["normal"], place + ".normal", result.normal_texture));
             if (value["normal"].contains("strength"))
-                NACRE_CHECK(number(value["normal"]["strength"], place + ".normal.strength", result.normal_texture.scale));
+                NACRE_CHECK(
+                    number(value["normal"]["strength"], place + ".normal.strength", result.normal_texture.scale));
         }
         if (value.contains("rotation_texture")) {
             NACRE_CHECK(members(value["rotation_texture"], place + ".rotation_texture",
@@ -157,8 +173,8 @@ class Reader {
 
     // A number, a color, or either under "value" beside a "texture". `set` takes one channel.
     template <typename Set>
-    Expected<void> input(const json& value, const std::string& place, std::string_view field, std::uint32_t channels, Node& owner,
-                         Set&& set) const {
+    Expected<void> input(const json& value, const std::string& place, std::string_view field, std::uint32_t channels,
+                         Node& owner, Set&& set) const {
         const json* constant = &value;
         if (value.is_object()) {
             NACRE_CHECK(members(value, place, {"value", "texture"}));
@@ -166,8 +182,9 @@ class Reader {
             if (value.contains("texture")) {
                 const json& texture = value["texture"];
                 const std::string at = place + ".texture";
-                NACRE_CHECK(members(texture, at,
-                                    {"image", "uv_set", "uv_offset", "uv_scale", "uv_rotation", "channel", "scale", "bias"}));
+                NACRE_CHECK(
+                    members(texture, at,
+                            {"image", "uv_set", "uv_offset", "uv_scale", "uv_rotation", "channel", "scale", "bias"}));
                 TextureInput read{.field = std::string(field)};
                 NACRE_CHECK(reference(texture, at, read.texture));
                 if (texture.contains("channel")) {
@@ -186,8 +203,9 @@ class Reader {
         }
         if (constant->is_array()) {
             if (constant->size() != channels) {
-                return refuse(place, fmt::format("it has {} numbers, not {}", constant->size(), channels),
-                              channels == 1 ? "Write one number." : "Write one number for all channels, or [red, green, blue].");
+                return refuse(
+                    place, fmt::format("it has {} numbers, not {}", constant->size(), channels),
+                    channels == 1 ? "Write one number." : "Write one number for all channels, or [red, green, blue].");
             }
             for (std::uint32_t channel = 0; channel < channels; ++channel) {
                 float read = 0.0f;
@@ -214,7 +232,8 @@ class Reader {
             read.frame = static_cast<std::uint32_t>(frame);
         }
         if (value.contains("features")) {
-            if (!value["features"].is_array()) return refuse(place + ".features", "it is no list", "Write a list of names.");
+            if (!value["features"].is_array())
+                return refuse(place + ".features", "it is no list", "Write a list of names.");
             for (const json& item : value["features"]) {
                 std::string name;
                 NACRE_CHECK(text(item, place + ".features", name));
@@ -232,7 +251,8 @@ class Reader {
         for (const SlabField& field : slab_fields()) {
             if (!value.contains(field.name)) continue;
             read.slab.features |= field.feature;
-            NACRE_CHECK(input(value[field.name], fmt::format("{}.{}", place, field.name), field.name, field.channels, read,
+            NACRE_CHECK(input(value[field.name], fmt::format("{}.{}", place, field.name), field.name, field.channels,
+                              read,
                               [&](std::uint32_t channel, float number) { field.set(read.slab, channel, number); }));
         }
         tree.nodes.push_back(std::move(read));
@@ -242,7 +262,8 @@ class Reader {
     Expected<NodeIndex> node(const json& value, const std::string& place, std::uint32_t depth, Tree& tree) const {
         NACRE_CHECK(members(value, place, {"slab", "mix", "layer", "coverage"}));
         if (value.size() != 1) {
-            return refuse(place, fmt::format("it has {} members", value.size()), "A node has one: slab, mix, layer or coverage.");
+            return refuse(place, fmt::format("it has {} members", value.size()),
+                          "A node has one: slab, mix, layer or coverage.");
         }
         const std::string kind = value.begin().key();
         const json& body = value.begin().value();
@@ -269,7 +290,8 @@ class Reader {
             NACRE_CHECK(is_mix ? members(body, at, {"name", "first", "second", "amount", "parameter_blend"})
                                : members(body, at, {"name", "of", "amount"}));
             read.amount = 1.0f;
-            if (!body.contains("amount")) return refuse(at, "it has no 'amount'", "Write a number in [0, 1], or a texture.");
+            if (!body.contains("amount"))
+                return refuse(at, "it has no 'amount'", "Write a number in [0, 1], or a texture.");
             NACRE_CHECK(input(body["amount"], at + ".amount", "amount", 1, read,
                               [&](std::uint32_t, float number) { read.amount = number; }));
             NACRE_TRY(read.first, child(is_mix ? "first" : "of"));
@@ -401,7 +423,8 @@ Expected<MaterialFile> parse_material(std::string_view text, std::string_view so
         const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n') + 1;
         const std::size_t line_start = text.substr(0, at).rfind('\n');
         const std::size_t column = at - (line_start == std::string_view::npos ? 0 : line_start + 1) + 1;
-        return reader.refuse(fmt::format("line {}, column {}", line, column), "the text is no JSON", "See docs/materials.md for the format.");
+        return reader.refuse(fmt::format("line {}, column {}", line, column), "the text is no JSON",
+                             "See docs/materials.md for the format.");
     }
     return Reader(source).file(document);
 }
@@ -426,7 +449,8 @@ std::string material_text(const MaterialFile& file) {
             json entry = json::object();
             if (frame.normal_texture.present()) {
                 entry["normal"] = reference_json(frame.normal_texture);
-                if (frame.normal_texture.scale != 1.0f) entry["normal"]["strength"] = number_json(frame.normal_texture.scale);
+                if (frame.normal_texture.scale != 1.0f)
+                    entry["normal"]["strength"] = number_json(frame.normal_texture.scale);
             }
             if (frame.rotation != 0.0f) entry["rotation"] = number_json(frame.rotation);
             if (frame.rotation_texture.present()) entry["rotation_texture"] = reference_json(frame.rotation_texture);
@@ -439,11 +463,12 @@ std::string material_text(const MaterialFile& file) {
 
 std::string material_schema() {
     const json one{{"oneOf", {json{{"type", "number"}}, json{{"const", "infinity"}}}}};
-    json placement{{"image", {{"type", "integer"}, {"minimum", 0}}},
-                   {"uv_set", {{"enum", {0, 1}}}},
-                   {"uv_offset", {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}}},
-                   {"uv_scale", {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}}},
-                   {"uv_rotation", {{"type", "number"}, {"description", "radians"}}}};
+    json placement{
+        {"image", {{"type", "integer"}, {"minimum", 0}}},
+        {"uv_set", {{"enum", {0, 1}}}},
+        {"uv_offset", {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}}},
+        {"uv_scale", {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}}},
+        {"uv_rotation", {{"type", "number"}, {"description", "radians"}}}};
     json texture = placement, normal = placement;
     texture.update(json{{"channel", {{"enum", {"r", "g", "b", "a"}}}},
                         {"scale", {{"type", "number"}}},
@@ -478,26 +503,33 @@ std::string material_schema() {
     };
     json kinds = json::array();
     kinds.push_back(only("slab", object_schema(std::move(slab))));
-    kinds.push_back(only("mix", object_schema({{"name", name}, {"first", node}, {"second", node}, {"amount", amount},
-                                               {"parameter_blend", yes}},
-                                              json::array({"first", "second", "amount"}))));
-    kinds.push_back(only("layer", object_schema({{"name", name}, {"top", node}, {"base", node}, {"thickness", one},
-                                                 {"parameter_blend", yes}},
-                                                json::array({"top", "base"}))));
-    kinds.push_back(only("coverage", object_schema({{"name", name}, {"of", node}, {"amount", amount}}, json::array({"of", "amount"}))));
-    json schema = object_schema({{"$schema", {{"type", "string"}}},
-                                 {"nacre_material", {{"const", 1}}},
-                                 {"name", name},
-                                 {"thin", yes},
-                                 {"surface_thickness", one},
-                                 {"images", {{"type", "array"}, {"items", {{"type", "string"}}}}},
-                                 {"frames", {{"type", "array"}, {"minItems", 1},
-                                             {"items", object_schema({{"normal", object_schema(std::move(normal), json::array({"image"}))},
-                                                                      {"rotation", {{"type", "number"}}},
-                                                                      {"rotation_texture", object_schema(placement, json::array({"image"}))}})}}},
-                                 {"root", node}},
-                                json::array({"nacre_material", "root"}));
-    schema["$defs"] = json{{"node", {{"oneOf", std::move(kinds)}}}, {"texture", object_schema(std::move(texture), json::array({"image"}))}};
+    kinds.push_back(only(
+        "mix",
+        object_schema({{"name", name}, {"first", node}, {"second", node}, {"amount", amount}, {"parameter_blend", yes}},
+                      json::array({"first", "second", "amount"}))));
+    kinds.push_back(only(
+        "layer",
+        object_schema({{"name", name}, {"top", node}, {"base", node}, {"thickness", one}, {"parameter_blend", yes}},
+                      json::array({"top", "base"}))));
+    kinds.push_back(only(
+        "coverage", object_schema({{"name", name}, {"of", node}, {"amount", amount}}, json::array({"of", "amount"}))));
+    json schema = object_schema(
+        {{"$schema", {{"type", "string"}}},
+         {"nacre_material", {{"const", 1}}},
+         {"name", name},
+         {"thin", yes},
+         {"surface_thickness", one},
+         {"images", {{"type", "array"}, {"items", {{"type", "string"}}}}},
+         {"frames",
+          {{"type", "array"},
+           {"minItems", 1},
+           {"items", object_schema({{"normal", object_schema(std::move(normal), json::array({"image"}))},
+                                    {"rotation", {{"type", "number"}}},
+                                    {"rotation_texture", object_schema(placement, json::array({"image"}))}})}}},
+         {"root", node}},
+        json::array({"nacre_material", "root"}));
+    schema["$defs"] = json{{"node", {{"oneOf", std::move(kinds)}}},
+                           {"texture", object_schema(std::move(texture), json::array({"image"}))}};
     json result{{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", "Material of Nacre"}};
     result.update(schema);
     return result.dump(2) + "\n";

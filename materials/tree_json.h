@@ -10,7 +10,8 @@
 #include "materials/tree.h"
 
 /// @file
-/// Trees as JSON: a format for people. docs/materials.md shows it, materials/material.schema.json describes it to editors.
+/// Trees as JSON: a format for people. docs/materials.md shows it, materials/material.schema.json describes it to
+/// editors.
 ///
 ///     {"nacre_material": 1, "name": "lacquered gold",
 ///      "root": {"layer": {"top": {"slab": {"roughness": 0.05, "albedo": 0}},
@@ -24,12 +25,13 @@ namespace nacre::materials {
 /// A tree and the pictures that its textures show: TextureReference::image counts in `images`.
 struct MaterialFile {
     Tree tree;
-    std::vector<std::filesystem::path> images;  ///< As written; load_material() makes them absolute to the file's folder.
+    std::vector<std::filesystem::path>
+        images;  ///< As written; load_material() makes them absolute to the file's folder.
 };
 
 /// Reads the format above. `source` names the text in errors. A field of a slab that belongs to a feature switches the
-/// feature on; unknown members are errors. Error: parse, with line and column, or the place as "root.layer.top.slab.f0";
-/// invalid_argument as validate().
+/// feature on; unknown members are errors. Error: parse, with line and column, or the place as
+/// "root.layer.top.slab.f0"; invalid_argument as validate().
 [[nodiscard]] Expected<MaterialFile> parse_material(std::string_view text, std::string_view source);
 
 /// The same from a file of at most 16 MiB. Error: as parse_material(), not_found or input_output.

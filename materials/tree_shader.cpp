@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/tree_shader.h"
 
-#include <algorithm>
 #include <fmt/format.h>
+
+#include <algorithm>
 #include <iterator>
 #include <utility>
 
@@ -16,13 +17,16 @@ class Printer {
     TreeShader run() {
         print("// {}\n", shape(tree_.visible_tree.root));
         for (const SlabFeature& feature : slab_features()) {
-            if ((topology_.features & feature.bit) != 0) result_.defines += fmt::format("#define {} 1\n", feature.macro);
+            if ((topology_.features & feature.bit) != 0)
+                result_.defines += fmt::format("#define {} 1\n", feature.macro);
         }
         print("#include \"materials/closures/blending.glsl\"\n\n");
         print("const uint tree_closure_count = {}u;\nconst uint tree_frame_count = {}u;\n\n", topology_.closures.size(),
               topology_.frames.size());
-        print("struct TreeState {{\n    Slab slabs[{0}];\n    Path paths[{0}];\n    float coverages[{0}];\n    Matter whole;\n    Matter top;\n}};\n",
-              topology_.closures.size());
+        print(
+            "struct TreeState {{\n    Slab slabs[{0}];\n    Path paths[{0}];\n    float coverages[{0}];\n    Matter "
+            "whole;\n    Matter top;\n}};\n",
+            topology_.closures.size());
         for (std::uint32_t leaf = 0; leaf < topology_.slabs.size(); ++leaf) print_slab(leaf);
         for (std::uint32_t i = 0; i < topology_.amounts.size(); ++i) print_amount(i);
         print_shade();
@@ -43,7 +47,8 @@ class Printer {
             case NodeKind::slab: return "slab";
             case NodeKind::coverage: return fmt::format("coverage({})", shape(node.first));
             case NodeKind::mix:
-            case NodeKind::layer: return fmt::format("{}({}, {})", name_of(node.kind), shape(node.first), shape(node.second));
+            case NodeKind::layer:
+                return fmt::format("{}({}, {})", name_of(node.kind), shape(node.first), shape(node.second));
         }
         return {};
     }
@@ -65,8 +70,9 @@ class Printer {
         if (input == nullptr) return {};
         result_.textures.push_back({.node = node, .input = *input});
         constexpr const char* swizzles[] = {"x", "y", "z", "w"};
-        const std::string texel = fmt::format("tree_texture({}u).{}", result_.textures.size() - 1,
-                                              channels == 3 ? (input->channel == 0 ? "xyz" : "yzw") : swizzles[input->channel]);
+        const std::string texel =
+            fmt::format("tree_texture({}u).{}", result_.textures.size() - 1,
+                        channels == 3 ? (input->channel == 0 ? "xyz" : "yzw") : swizzles[input->channel]);
         const std::string bias = parameter(input->bias), scale = parameter(input->scale);
         return fmt::format(" * ({} + {} * {})", bias, scale, texel);
     }
@@ -88,7 +94,8 @@ class Printer {
             } else {
                 std::string channels[3];
                 for (std::uint32_t channel = 0; channel < 3; ++channel)
-                    channels[channel] = is_used ? parameter(field.get(slab, channel)) : literal(field.get(plain, channel));
+                    channels[channel] =
+                        is_used ? parameter(field.get(slab, channel)) : literal(field.get(plain, channel));
                 value = fmt::format("vec3({}, {}, {})", channels[0], channels[1], channels[2]);
             }
             if (is_used) value += texture_factor(index, field.name, field.channels);
@@ -96,7 +103,9 @@ class Printer {
         }
         if ((topology_.features & slab_specular_lut) != 0) print("    slab.specular_lut = {}u;\n", slab.specular_lut);
         if ((topology_.features & slab_glints) != 0) {
-            print("    slab.glint_position = vec2(0.0);\n    slab.glint_dx = vec2(0.0);\n    slab.glint_dy = vec2(0.0);\n");
+            print(
+                "    slab.glint_position = vec2(0.0);\n    slab.glint_dx = vec2(0.0);\n    slab.glint_dy = "
+                "vec2(0.0);\n");
         }
         print("    return slab;\n}}\n");
     }
@@ -128,8 +137,8 @@ class Printer {
                 const std::uint32_t frame = tree_.visible_tree.nodes[topology_.slabs[step.a]].frame;
                 const std::size_t slot = frame_slot(frame);
                 slots[step.result] = slot < topology_.frames.size() ? slot : 0;
-            } else if (step.kind == StepKind::cover_slab || step.kind == StepKind::mix_slabs || step.kind == StepKind::layer_slabs ||
-                       step.kind == StepKind::track_slab) {
+            } else if (step.kind == StepKind::cover_slab || step.kind == StepKind::mix_slabs ||
+                       step.kind == StepKind::layer_slabs || step.kind == StepKind::track_slab) {
                 slots[step.result] = slots[step.a];
             }
         }
@@ -139,77 +148,106 @@ class Printer {
     void print_shade() {
         const std::vector<std::size_t> slots = frames_of_slabs();
         print("\nTreeState shade_tree(vec3 views[{}], float footprint) {{\n", topology_.frames.size());
-        for (std::size_t i = 0; i < topology_.amounts.size(); ++i) print("    float amount_{0} = tree_amount_{0}();\n", i);
+        for (std::size_t i = 0; i < topology_.amounts.size(); ++i)
+            print("    float amount_{0} = tree_amount_{0}();\n", i);
         print("    Path path_0 = open_path();\n    float variance_0 = 0.0;\n");
         for (const Step& step : topology_.steps) {
-            const std::string amount = step.amount == Step::none  ? std::string()
-                                       : step.complement ? fmt::format("1.0 - amount_{}", step.amount)
-                                                         : fmt::format("amount_{}", step.amount);
+            const std::string amount = step.amount == Step::none ? std::string()
+                                       : step.complement         ? fmt::format("1.0 - amount_{}", step.amount)
+                                                                 : fmt::format("amount_{}", step.amount);
             switch (step.kind) {
                 case StepKind::read_slab: print("    Slab slab_{} = tree_slab_{}();\n", step.result, step.a); break;
                 case StepKind::cover_slab:
-                    print("    Slab slab_{0} = slab_{1};\n    slab_{0}.coverage *= {2};\n", step.result, step.a, amount);
+                    print("    Slab slab_{0} = slab_{1};\n    slab_{0}.coverage *= {2};\n", step.result, step.a,
+                          amount);
                     break;
-                case StepKind::mix_slabs: print("    Slab slab_{} = mix_slabs(slab_{}, slab_{}, {});\n", step.result, step.a, step.b, amount); break;
+                case StepKind::mix_slabs:
+                    print("    Slab slab_{} = mix_slabs(slab_{}, slab_{}, {});\n", step.result, step.a, step.b, amount);
+                    break;
                 case StepKind::layer_slabs:
-                    print("    Slab slab_{} = layer_slabs(slab_{}, slab_{}, matter_{}, matter_{});\n", step.result, step.a, step.b, step.c,
-                          step.d);
+                    print("    Slab slab_{} = layer_slabs(slab_{}, slab_{}, matter_{}, matter_{});\n", step.result,
+                          step.a, step.b, step.c, step.d);
                     break;
-                case StepKind::slab_spread: print("    Spread spread_{} = slab_spread(slab_{}, views[{}].z);\n", step.result, step.a, slots[step.a]); break;
-                case StepKind::cover_spread: print("    Spread spread_{} = cover_spread(spread_{}, {});\n", step.result, step.a, amount); break;
+                case StepKind::slab_spread:
+                    print("    Spread spread_{} = slab_spread(slab_{}, views[{}].z);\n", step.result, step.a,
+                          slots[step.a]);
+                    break;
+                case StepKind::cover_spread:
+                    print("    Spread spread_{} = cover_spread(spread_{}, {});\n", step.result, step.a, amount);
+                    break;
                 case StepKind::mix_spread:
-                    print("    Spread spread_{} = mix_spread(spread_{}, spread_{}, {});\n", step.result, step.a, step.b, amount);
+                    print("    Spread spread_{} = mix_spread(spread_{}, spread_{}, {});\n", step.result, step.a, step.b,
+                          amount);
                     break;
                 case StepKind::layer_spread:
                     print("    Spread spread_{} = layer_spread(spread_{}, spread_{});\n", step.result, step.a, step.b);
                     break;
                 case StepKind::variance_below:
-                    print("    float variance_{} = variance_below(variance_{}, spread_{});\n", step.result, step.a, step.b);
+                    print("    float variance_{} = variance_below(variance_{}, spread_{});\n", step.result, step.a,
+                          step.b);
                     break;
-                case StepKind::track_slab: print("    Slab slab_{} = track_slab(slab_{}, variance_{});\n", step.result, step.a, step.b); break;
+                case StepKind::track_slab:
+                    print("    Slab slab_{} = track_slab(slab_{}, variance_{});\n", step.result, step.a, step.b);
+                    break;
                 case StepKind::slab_matter:
-                    print("    Matter matter_{0} = slab_matter(slab_{1}, prepare_closure(slab_{1}, views[{2}], footprint));\n", step.result,
-                          step.a, slots[step.a]);
+                    print(
+                        "    Matter matter_{0} = slab_matter(slab_{1}, prepare_closure(slab_{1}, views[{2}], "
+                        "footprint));\n",
+                        step.result, step.a, slots[step.a]);
                     break;
                 case StepKind::base_matter:
-                    print("    Matter matter_{} = base_matter(slab_{}, views[{}].z);\n", step.result, step.a, slots[step.a]);
+                    print("    Matter matter_{} = base_matter(slab_{}, views[{}].z);\n", step.result, step.a,
+                          slots[step.a]);
                     break;
-                case StepKind::cover_matter: print("    Matter matter_{} = cover_matter(matter_{}, {});\n", step.result, step.a, amount); break;
+                case StepKind::cover_matter:
+                    print("    Matter matter_{} = cover_matter(matter_{}, {});\n", step.result, step.a, amount);
+                    break;
                 case StepKind::mix_matter:
-                    print("    Matter matter_{} = mix_matter(matter_{}, matter_{}, {});\n", step.result, step.a, step.b, amount);
+                    print("    Matter matter_{} = mix_matter(matter_{}, matter_{}, {});\n", step.result, step.a, step.b,
+                          amount);
                     break;
                 case StepKind::layer_matter:
                     print("    Matter matter_{} = layer_matter(matter_{}, matter_{});\n", step.result, step.a, step.b);
                     break;
-                case StepKind::path_through_mix: print("    Path path_{} = path_through_mix(path_{}, {});\n", step.result, step.a, amount); break;
+                case StepKind::path_through_mix:
+                    print("    Path path_{} = path_through_mix(path_{}, {});\n", step.result, step.a, amount);
+                    break;
                 case StepKind::path_through_layer:
-                    print("    Path path_{} = path_through_layer(path_{}, matter_{}, matter_{}.albedo);\n", step.result, step.a, step.b, step.c);
+                    print("    Path path_{} = path_through_layer(path_{}, matter_{}, matter_{}.albedo);\n", step.result,
+                          step.a, step.b, step.c);
                     break;
             }
         }
-        print("    TreeState state;\n    state.whole = matter_{};\n    state.top = matter_{};\n", topology_.whole, topology_.top);
+        print("    TreeState state;\n    state.whole = matter_{};\n    state.top = matter_{};\n", topology_.whole,
+              topology_.top);
         for (std::size_t i = 0; i < topology_.closures.size(); ++i) {
             const TopologyClosure& closure = topology_.closures[i];
-            print("    state.slabs[{0}] = slab_{1};\n    state.slabs[{0}].features = {4}u;\n    state.paths[{0}] = path_{2};\n"
-                  "    state.coverages[{0}] = slab_coverage(slab_{1}, views[{3}].z);\n",
-                  i, closure.slab, closure.path, frame_slot(closure.frame), closure.features);
+            print(
+                "    state.slabs[{0}] = slab_{1};\n    state.slabs[{0}].features = {4}u;\n    state.paths[{0}] = "
+                "path_{2};\n"
+                "    state.coverages[{0}] = slab_coverage(slab_{1}, views[{3}].z);\n",
+                i, closure.slab, closure.path, frame_slot(closure.frame), closure.features);
         }
         print("    return state;\n}}\n");
     }
 
     void print_reflected() {
-        print("\nvec3 tree_reflected(TreeState state, vec3 views[{0}], vec3 lights[{0}], float footprint) {{\n    vec3 sum = vec3(0.0);\n",
-              topology_.frames.size());
+        print(
+            "\nvec3 tree_reflected(TreeState state, vec3 views[{0}], vec3 lights[{0}], float footprint) {{\n    vec3 "
+            "sum = vec3(0.0);\n",
+            topology_.frames.size());
         for (std::size_t i = 0; i < topology_.closures.size(); ++i) {
             const TopologyClosure& closure = topology_.closures[i];
             const std::size_t slot = frame_slot(closure.frame);
-            print("    vec3 weight_{0} = state.paths[{0}].weight * state.coverages[{0}];\n"
-                  "    if (largest(weight_{0}) > 0.0) {{\n"
-                  "        Slab slab = state.slabs[{0}];\n        slab.features = {1}u;\n"
-                  "        ClosureValue value = evaluate_closure(prepare_closure(slab, views[{2}], footprint), lights[{2}]);\n"
-                  "        sum += (value.specular + value.diffuse + value.subsurface) * weight_{0} * "
-                  "top_transmittance(state.paths[{0}], lights[{2}].z);\n    }}\n",
-                  i, closure.features, slot);
+            print(
+                "    vec3 weight_{0} = state.paths[{0}].weight * state.coverages[{0}];\n"
+                "    if (largest(weight_{0}) > 0.0) {{\n"
+                "        Slab slab = state.slabs[{0}];\n        slab.features = {1}u;\n"
+                "        ClosureValue value = evaluate_closure(prepare_closure(slab, views[{2}], footprint), "
+                "lights[{2}]);\n"
+                "        sum += (value.specular + value.diffuse + value.subsurface) * weight_{0} * "
+                "top_transmittance(state.paths[{0}], lights[{2}].z);\n    }}\n",
+                i, closure.features, slot);
         }
         print("    return sum;\n}}\n");
     }

@@ -7,8 +7,8 @@
 #include "materials/topology.h"
 
 /// @file
-/// The steps of a topology as GLSL, specialized to it: straight code without loops over the tree, with the features of each
-/// closure as constants. Numbers and textures stay inputs, so that materials of one topology share a shader.
+/// The steps of a topology as GLSL, specialized to it: straight code without loops over the tree, with the features of
+/// each closure as constants. Numbers and textures stay inputs, so that materials of one topology share a shader.
 ///
 ///     NACRE_TRY(const FlattenedTree flat, flatten(tree));
 ///     const TreeShader shader = tree_shader(flat);
@@ -18,7 +18,7 @@ namespace nacre::materials {
 
 /// A texture that the shader reads: `tree_texture(i)` is the i-th.
 struct TreeTexture {
-    NodeIndex node;      ///< Of the visible tree.
+    NodeIndex node;  ///< Of the visible tree.
     TextureInput input;
 };
 

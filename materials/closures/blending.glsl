@@ -3,8 +3,9 @@
 #define NACRE_CLOSURES_BLENDING
 #include "materials/closures/operators.glsl"
 
-// One slab in place of two, where a mix or a layer must do with one closure: their parameters blended by how much of each is
-// seen. A field whose feature one of both lacks counts as the value that does nothing, so that a half of fuzz stays a half of fuzz.
+// One slab in place of two, where a mix or a layer must do with one closure: their parameters blended by how much of
+// each is seen. A field whose feature one of both lacks counts as the value that does nothing, so that a half of fuzz
+// stays a half of fuzz.
 
 // How much of each of two slabs is seen in one place.
 struct BlendShares {
@@ -39,16 +40,19 @@ Slab blend_slabs(Slab a, Slab b, BlendShares shares) {
                           (b.features & slab_anisotropy) != 0u ? b.anisotropy : 0.0, gloss);
 #endif
 #ifdef NACRE_SLAB_F90
-    slab.f90 = mix((a.features & slab_f90) != 0u ? a.f90 : vec3(1.0), (b.features & slab_f90) != 0u ? b.f90 : vec3(1.0), gloss);
+    slab.f90 = mix((a.features & slab_f90) != 0u ? a.f90 : vec3(1.0),
+                   (b.features & slab_f90) != 0u ? b.f90 : vec3(1.0), gloss);
 #endif
 #ifdef NACRE_SLAB_F82
-    slab.f82 = mix((a.features & slab_f82) != 0u ? a.f82 : vec3(1.0), (b.features & slab_f82) != 0u ? b.f82 : vec3(1.0), gloss);
+    slab.f82 = mix((a.features & slab_f82) != 0u ? a.f82 : vec3(1.0),
+                   (b.features & slab_f82) != 0u ? b.f82 : vec3(1.0), gloss);
 #endif
 #ifdef NACRE_SLAB_SECOND_LOBE
     float second_a = (a.features & slab_second_lobe) != 0u ? a.second_weight : 0.0;
     float second_b = (b.features & slab_second_lobe) != 0u ? b.second_weight : 0.0;
     slab.second_weight = mix(second_a, second_b, gloss);
-    slab.second_roughness = mix(a.second_roughness, b.second_roughness, blend_share((1.0 - gloss) * second_a, gloss * second_b));
+    slab.second_roughness =
+        mix(a.second_roughness, b.second_roughness, blend_share((1.0 - gloss) * second_a, gloss * second_b));
 #endif
 #ifdef NACRE_SLAB_FUZZ
     float fuzz_a = (a.features & slab_fuzz) != 0u ? a.fuzz_amount : 0.0;
@@ -112,8 +116,10 @@ Slab mix_slabs(Slab a, Slab b, float amount) {
 
 // A layer; the matters are those of both slabs.
 Slab layer_slabs(Slab top, Slab base, Matter top_matter, Matter base_matter) {
-    // What crosses the top is tinted twice: towards the view, and from the light, which is taken to come along the normal.
-    vec3 through = top_matter.view_transmittance * bounce_factor(top_matter.internal, base_matter.albedo) * top_matter.transmittance;
+    // What crosses the top is tinted twice: towards the view, and from the light, which is taken to come along the
+    // normal.
+    vec3 through = top_matter.view_transmittance * top_matter.transmittance *
+                   bounce_factor(top_matter.internal, base_matter.albedo);
     BlendShares shares;
     shares.coverage = top.coverage + (1.0 - top.coverage) * base.coverage;
     shares.first = top.coverage;
@@ -124,7 +130,8 @@ Slab layer_slabs(Slab top, Slab base, Matter top_matter, Matter base_matter) {
     Slab seen = top;
     seen.albedo = top.albedo * (vec3(1.0) - top_matter.transmittance);
     Slab slab = blend_slabs(seen, base, shares);
-    // Both interfaces are there and the base's medium is below both; only what is in the top's own medium counts by share.
+    // Both interfaces are there and the base's medium is below both; only what is in the top's own medium counts by
+    // share.
 #ifdef NACRE_SLAB_MEDIUM
     if ((base.features & slab_medium) == 0u) {
         slab.mean_free_path = vec3(0.0);

@@ -3,8 +3,8 @@
 #define NACRE_CLOSURES_OPERATORS
 #include "materials/closures/closure.glsl"
 
-// Variance of slopes against roughness (Belcour 2018, "Efficient Rendering of Layered Materials using an Atomic Decomposition
-// with Statistical Operators", supplemental: a fit to the variance of GGX lobes).
+// Variance of slopes against roughness (Belcour 2018, "Efficient Rendering of Layered Materials using an Atomic
+// Decomposition with Statistical Operators", supplemental: a fit to the variance of GGX lobes).
 float roughness_to_variance(float roughness) {
     float a = pow(min(roughness * roughness, 0.9999), 1.1);
     return a / (1.0 - a);
@@ -14,9 +14,9 @@ float variance_to_roughness(float variance) {
     return sqrt(pow(variance / (1.0 + variance), 1.0 / 1.1));
 }
 
-// Variance that a rough interface adds to what is seen through it: refraction of the light on its way in and of the view on
-// its way out, each that of a lobe whose alpha is scaled by half of |n - 1| / n and |n - 1| (Belcour 2018), for index
-// 1.5 and at normal incidence. A base of any roughness counts alike.
+// Variance that a rough interface adds to what is seen through it: refraction of the light on its way in and of the
+// view on its way out, each that of a lobe whose alpha is scaled by half of |n - 1| / n and |n - 1| (Belcour 2018),
+// for index 1.5 and at normal incidence. A base of any roughness counts alike.
 float refraction_variance(float roughness) {
     float alpha = roughness * roughness;
     float into = pow(min(alpha * (1.0 / 6.0), 0.9999), 1.1);
@@ -29,9 +29,9 @@ float tracked_roughness(float roughness, float variance) {
     return variance > 0.0 ? variance_to_roughness(roughness_to_variance(roughness) + variance) : roughness;
 }
 
-// What the operators of a tree do to the matter they arrange: what is tracked follows Hillaire and de Rousiers, "Authoring
-// Materials that matter", SIGGRAPH 2023; the formulae are ours. Any subtree counts as one piece of matter whose parts lie independently of
-// each other, so that a slab yields one closure whatever is above it.
+// What the operators of a tree do to the matter they arrange: what is tracked follows Hillaire and de Rousiers,
+// "Authoring Materials that matter", SIGGRAPH 2023; the formulae are ours. Any subtree counts as one piece of matter
+// whose parts lie independently of each other, so that a slab yields one closure whatever is above it.
 
 // How much what is seen through a subtree spreads. Known before any closure is, since closures depend on it.
 struct Spread {
@@ -39,8 +39,8 @@ struct Spread {
     float variance;  // that the covered share adds to the slopes of what lies below
 };
 
-// A slab, or what stands for a subtree, as what lies below it sees it. The last five are those of the covered share; where
-// nothing is covered they mean nothing.
+// A slab, or what stands for a subtree, as what lies below it sees it. The last five are those of the covered share;
+// where nothing is covered they mean nothing.
 struct Matter {
     float coverage;
     vec3 transmittance;       // straight through the medium along the normal
@@ -129,9 +129,12 @@ Matter base_matter(Slab slab, float cos_view) {
 #ifdef NACRE_SLAB_MEDIUM
     if ((slab.features & slab_medium) != 0u) {
         float inside = refracted_cosine(mean_cosine, dot(slab.f0, vec3(1.0 / 3.0)));
-        Scattering x = medium_scattering(slab.albedo.x, optical_depth(slab.mean_free_path.x, slab.thickness), slab.phase_anisotropy, inside);
-        Scattering y = medium_scattering(slab.albedo.y, optical_depth(slab.mean_free_path.y, slab.thickness), slab.phase_anisotropy, inside);
-        Scattering z = medium_scattering(slab.albedo.z, optical_depth(slab.mean_free_path.z, slab.thickness), slab.phase_anisotropy, inside);
+        Scattering x = medium_scattering(slab.albedo.x, optical_depth(slab.mean_free_path.x, slab.thickness),
+                                         slab.phase_anisotropy, inside);
+        Scattering y = medium_scattering(slab.albedo.y, optical_depth(slab.mean_free_path.y, slab.thickness),
+                                         slab.phase_anisotropy, inside);
+        Scattering z = medium_scattering(slab.albedo.z, optical_depth(slab.mean_free_path.z, slab.thickness),
+                                         slab.phase_anisotropy, inside);
         reflected = vec3(x.reflected, y.reflected, z.reflected);
         through = vec3(x.through + x.straight, y.through + y.straight, z.through + z.straight);
     }
@@ -197,10 +200,12 @@ Matter layer_matter(Matter top, Matter base) {
     float tb = both / m.coverage;
     m.transmittance = t * top.transmittance + b * base.transmittance + tb * top.transmittance * base.transmittance;
     m.view_transmittance =
-        t * top.view_transmittance + b * base.view_transmittance + tb * top.view_transmittance * base.view_transmittance;
+        t * top.view_transmittance + b * base.view_transmittance +
+        tb * top.view_transmittance * base.view_transmittance;
     // Light goes on between the top, from below, and the base, from above.
     vec3 between = vec3(1.0) / max(vec3(1.0) - base.albedo * top.internal, vec3(1e-6));
-    vec3 internal = base.internal + (vec3(1.0) - base.internal) * base.transmittance * top.internal * base.passed * between;
+    vec3 internal =
+        base.internal + (vec3(1.0) - base.internal) * base.transmittance * top.internal * base.passed * between;
     vec3 albedo = top.albedo + top.passed * base.albedo * bounce_factor(top.internal, base.albedo) * top.transmittance;
     vec3 passed = top.passed * base.passed * between;
     m.internal = t * top.internal + b * base.internal + tb * min(internal, vec3(1.0));
@@ -216,8 +221,8 @@ Path path_through_mix(Path path, float amount) {
     return above;
 }
 
-// A path that comes up from the base of a layer under `top`; `base_albedo` is that of all that lies below the top, to the
-// bottom of the material (Matter::albedo): light that is thrown back may hit any part of it.
+// A path that comes up from the base of a layer under `top`; `base_albedo` is that of all that lies below the top, to
+// the bottom of the material (Matter::albedo): light that is thrown back may hit any part of it.
 Path path_through_layer(Path path, Matter top, vec3 base_albedo) {
     vec3 beside = vec3(1.0 - top.coverage);
     vec3 through = top.coverage * top.view_transmittance * bounce_factor(top.internal, base_albedo);
@@ -227,15 +232,16 @@ Path path_through_layer(Path path, Matter top, vec3 base_albedo) {
     Path above;
     above.weight = path.weight * sum;
     above.uncovered = path.uncovered * by;
-    // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer that stands
-    // for both is between.
+    // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
+    // that stands for both is between.
     vec3 kept = mix(path.transmittance, vec3(1.0), path.uncovered) * mix(top.transmittance, vec3(1.0), by);
-    above.transmittance = min(max(kept - above.uncovered, vec3(0.0)) / max(vec3(1.0) - above.uncovered, vec3(1e-30)), vec3(1.0));
+    vec3 covered = max(vec3(1.0) - above.uncovered, vec3(1e-30));
+    above.transmittance = min(max(kept - above.uncovered, vec3(0.0)) / covered, vec3(1.0));
     return above;
 }
 
-// Light's way down to a slab, from the cosine outside: the layers' transmittance along the refracted direction (index 1.5,
-// that of nearly all coats), and 1 on the uncovered share.
+// Light's way down to a slab, from the cosine outside: the layers' transmittance along the refracted direction (index
+// 1.5, that of nearly all coats), and 1 on the uncovered share.
 vec3 top_transmittance(Path path, float cos_light) {
     float sin2 = (1.0 - cos_light * cos_light) * (1.0 / 2.25);
     float inverse_cosine = inversesqrt(1.0 - sin2);

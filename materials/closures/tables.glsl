@@ -8,8 +8,8 @@
 //     vec4 interface_table(vec2 at)     materials/tables/interface_table.h
 //     vec2 anisotropy_table(vec4 at)    with slab_anisotropy: materials/tables/anisotropy_table.h
 //
-// which interpolate linearly along all axes; 0 is the first entry of an axis and 1 the last, so that a texture is read at
-// (at * (size - 1) + 0.5) / size. materials/closures/table_buffers.glsl has them for buffers.
+// which interpolate linearly along all axes; 0 is the first entry of an axis and 1 the last, so that a texture is
+// read at (at * (size - 1) + 0.5) / size. materials/closures/table_buffers.glsl has them for buffers.
 
 // What a GGX lobe with single scattering reflects towards a direction.
 struct GgxAlbedo {

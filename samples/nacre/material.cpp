@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "core/image.h"
@@ -42,7 +43,8 @@ Expected<Tree> material_of_scene(const std::string& scene_name, const std::strin
         if (material.name == name) return tree_of(material);
         names.push_back(material.name);
     }
-    return fail(ErrorCode::not_found, "find material", fmt::format("'{}'", name), fmt::format("scene '{}' has none of this name", scene_name),
+    return fail(ErrorCode::not_found, "find material", fmt::format("'{}'", name),
+                fmt::format("scene '{}' has none of this name", scene_name),
                 fmt::format("Use one of: {}.", fmt::join(names, ", ")));
 }
 
@@ -76,23 +78,24 @@ Expected<std::array<glm::dvec3, 2>> parse_directions(const std::string& text) {
         const auto [next, error] = std::from_chars(at, end, value);
         const bool is_last = i == 5;
         if (error != std::errc{} || !std::isfinite(value) || (is_last ? next != end : next == end || *next != ',')) {
-            return fail(ErrorCode::invalid_argument, "read directions", fmt::format("'{}'", text), "they are not six numbers",
-                        "Write view and light as x,y,z,x,y,z; z is the normal.");
+            return fail(ErrorCode::invalid_argument, "read directions", fmt::format("'{}'", text),
+                        "they are not six numbers", "Write view and light as x,y,z,x,y,z; z is the normal.");
         }
         result[static_cast<std::size_t>(i / 3)][i % 3] = value;
         at = next + (is_last ? 0 : 1);
     }
     for (glm::dvec3& direction : result) {
-        const double length = std::sqrt(direction.x * direction.x + direction.y * direction.y + direction.z * direction.z);
+        const double length =
+            std::sqrt(direction.x * direction.x + direction.y * direction.y + direction.z * direction.z);
         if (length == 0.0) {
-            return fail(ErrorCode::invalid_argument, "read directions", fmt::format("'{}'", text), "one of them has no length",
-                        "Write view and light as x,y,z,x,y,z; z is the normal.");
+            return fail(ErrorCode::invalid_argument, "read directions", fmt::format("'{}'", text),
+                        "one of them has no length", "Write view and light as x,y,z,x,y,z; z is the normal.");
         }
         direction /= length;
     }
     if (result[0].z <= 0.0) {
-        return fail(ErrorCode::invalid_argument, "read directions", fmt::format("'{}'", text), "the view is below the surface",
-                    "Its third number must be above 0.");
+        return fail(ErrorCode::invalid_argument, "read directions", fmt::format("'{}'", text),
+                    "the view is below the surface", "Its third number must be above 0.");
     }
     return result;
 }
@@ -107,10 +110,12 @@ Expected<std::string> evaluation_text(const FlattenedTree& flat, const std::stri
         const auto value = library.evaluate_closure(c.closure, parsed[1]);
         const Node& node = flat.visible_tree.nodes[c.node];
         table.add({node.name.empty() ? fmt::format("node {}", c.node) : node.name, color(value.specular),
-                   color(value.diffuse + value.subsurface), fmt::format("{:.6g}", library.closure_pdf(c.closure, parsed[1])),
-                   color(c.path.weight * c.coverage), color(library.top_transmittance(c.path, std::max(parsed[1].z, 0.0)))});
+                   color(value.diffuse + value.subsurface),
+                   fmt::format("{:.6g}", library.closure_pdf(c.closure, parsed[1])), color(c.path.weight * c.coverage),
+                   color(library.top_transmittance(c.path, std::max(parsed[1].z, 0.0)))});
     }
-    return table.text() + fmt::format("sum: {}\n", color(parsed[1].z > 0.0 ? reflected(shaded, parsed[1]) : glm::dvec3(0.0)));
+    return table.text() +
+           fmt::format("sum: {}\n", color(parsed[1].z > 0.0 ? reflected(shaded, parsed[1]) : glm::dvec3(0.0)));
 }
 
 struct ShaderFigures {
@@ -147,8 +152,9 @@ void main() {{
                                          shader.defines, shader.glsl);
     const auto start = std::chrono::steady_clock::now();
     NACRE_TRY(const rhi::ShaderDesc compiled, compiler.compile({.path = "material.comp", .text = text}));
-    return ShaderFigures{.bytes = 4 * compiled.spirv.size(),
-                         .compile_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count()};
+    return ShaderFigures{
+        .bytes = 4 * compiled.spirv.size(),
+        .compile_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count()};
 }
 
 Outcome list_materials(const std::string& json) {
@@ -158,9 +164,12 @@ Outcome list_materials(const std::string& json) {
         NACRE_TRY(const Tree tree, make_builtin_material(material.name));
         NACRE_TRY(const FlattenedTree flat, flatten(tree));
         const std::uint32_t bytes = storage_layout(flat).total_bytes();
-        table.add({std::string(material.name), fmt::format("{}", bytes), fmt::format("{}", flat.topology.closures.size()),
-                   std::string(material.meaning)});
-        rows.push_back({{"name", material.name}, {"meaning", material.meaning}, {"bytes", bytes}, {"closures", flat.topology.closures.size()}});
+        table.add({std::string(material.name), fmt::format("{}", bytes),
+                   fmt::format("{}", flat.topology.closures.size()), std::string(material.meaning)});
+        rows.push_back({{"name", material.name},
+                        {"meaning", material.meaning},
+                        {"bytes", bytes},
+                        {"closures", flat.topology.closures.size()}});
     }
     print_result(json, table.text());
     NACRE_CHECK(write_json(json, Json{{"materials", rows}}.dump(2)));
@@ -186,8 +195,9 @@ Outcome run(const MaterialArguments& arguments) {
 
     NACRE_TRY(const passes::Profile* profile, passes::find_profile(arguments.profile));
     const std::uint32_t budget = arguments.budget.value_or(profile->material_bytes);
-    NACRE_TRY(const Simplification result, arguments.full ? simplify_fully(tree)
-                                                          : simplify(tree, {.closures = profile->material_closures, .bytes = budget}));
+    NACRE_TRY(const Simplification result,
+              arguments.full ? simplify_fully(tree)
+                             : simplify(tree, {.closures = profile->material_closures, .bytes = budget}));
     NACRE_TRY(const ShaderFigures shader, shader_figures(flat));
     const StorageLayout layout = storage_layout(flat);
     const SimplificationStep& last = result.steps.back();
@@ -203,8 +213,8 @@ Outcome run(const MaterialArguments& arguments) {
             NACRE_TRY(const measure::FlipResult flip, measure::compute_flip(drawn.front().ball, ball));
             image_error = flip.mean;
         }
-        steps.add({step.what, fmt::format("{}", step.bytes), fmt::format("{}", step.closures), figure_text(step.albedo_error),
-                   figure_text(step.lobe_error), figure_text(image_error)});
+        steps.add({step.what, fmt::format("{}", step.bytes), fmt::format("{}", step.closures),
+                   figure_text(step.albedo_error), figure_text(step.lobe_error), figure_text(image_error)});
         step_rows.push_back({{"what", step.what},
                              {"bytes", step.bytes},
                              {"closures", step.closures},
@@ -212,8 +222,10 @@ Outcome run(const MaterialArguments& arguments) {
                              {"lobe_error", step.lobe_error},
                              {"image_error", image_error}});
         drawn.push_back({.captions = {step.what.size() > 28 ? step.what.substr(0, 26) + ".." : step.what,
-                                      fmt::format("{} bytes, {} closure{}", step.bytes, step.closures, step.closures == 1 ? "" : "s"),
-                                      fmt::format("albedo error {:.4f}", step.albedo_error), fmt::format("FLIP {:.4f}", image_error)},
+                                      fmt::format("{} bytes, {} closure{}", step.bytes, step.closures,
+                                                  step.closures == 1 ? "" : "s"),
+                                      fmt::format("albedo error {:.4f}", step.albedo_error),
+                                      fmt::format("FLIP {:.4f}", image_error)},
                          .ball = std::move(ball)});
     }
 
@@ -222,8 +234,8 @@ Outcome run(const MaterialArguments& arguments) {
     text += fmt::format("bytes: {} requested ({} words), {} after simplification, budget {}{}\n", layout.total_bytes(),
                         layout.total_bytes() / 4, last.bytes, arguments.full ? "none" : fmt::format("{}", budget),
                         result.fits ? "" : " - it does not fit");
-    text += fmt::format("closures: {} before, {} after; tangent bases: {}; class: {}\n", flat.topology.closures.size(), last.closures,
-                        flat.topology.frames.size(), name_of(layout.storage_class));
+    text += fmt::format("closures: {} before, {} after; tangent bases: {}; class: {}\n", flat.topology.closures.size(),
+                        last.closures, flat.topology.frames.size(), name_of(layout.storage_class));
     text += fmt::format("shader: {} of SPIR-V, {:.0f} ms to compile\n\n", bytes_text(shader.bytes), shader.compile_ms);
     TextTable slabs({"slab", "place", "base", "features"});
     Json features = Json::array();
@@ -233,7 +245,9 @@ Outcome run(const MaterialArguments& arguments) {
     for (const TopologyClosure& closure : flat.topology.closures) {
         const Node& node = flat.visible_tree.nodes[closure.node];
         slabs.add({node.name.empty() ? fmt::format("node {}", closure.node) : node.name,
-                   closure.is_top ? closure.is_bottom ? "alone" : "top" : closure.is_bottom ? "bottom" : "middle",
+                   closure.is_top      ? closure.is_bottom ? "alone" : "top"
+                   : closure.is_bottom ? "bottom"
+                                       : "middle",
                    fmt::format("{}", closure.frame), features_text(closure.features)});
     }
     text += slabs.text() + "\n" + steps.text();
@@ -252,8 +266,8 @@ Outcome run(const MaterialArguments& arguments) {
                                                 {"steps", step_rows}}
                                                .dump(2)));
     if (!arguments.output.empty()) {
-        const std::string title = fmt::format("{}  {} bytes, {}  profile {}", tree.name, layout.total_bytes(), name_of(layout.storage_class),
-                                              arguments.profile);
+        const std::string title = fmt::format("{}  {} bytes, {}  profile {}", tree.name, layout.total_bytes(),
+                                              name_of(layout.storage_class), arguments.profile);
         NACRE_CHECK(write_png(arguments.output, material_sheet(title, flat, drawn)));
     }
     return ExitCode::success;

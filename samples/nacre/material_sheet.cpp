@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "samples/nacre/material_sheet.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fmt/format.h>
 #include <map>
 #include <numbers>
 
@@ -38,15 +39,18 @@ class Canvas {
     void fill(int x, int y, int width, int height, const Color& color) {
         for (int row = std::max(y, 0); row < std::min(y + height, static_cast<int>(image_.height)); ++row) {
             for (int column = std::max(x, 0); column < std::min(x + width, static_cast<int>(image_.width)); ++column)
-                std::copy_n(&color.x, 3, image_.texel(static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row)));
+                std::copy_n(&color.x, 3,
+                            image_.texel(static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row)));
         }
     }
 
     void line(double x0, double y0, double x1, double y1, const Color& color) {
-        const int steps = std::max(1, static_cast<int>(std::ceil(2.0 * std::max(std::abs(x1 - x0), std::abs(y1 - y0)))));
+        const int steps =
+            std::max(1, static_cast<int>(std::ceil(2.0 * std::max(std::abs(x1 - x0), std::abs(y1 - y0)))));
         for (int i = 0; i <= steps; ++i) {
             const double t = static_cast<double>(i) / steps;
-            fill(static_cast<int>(std::lround(x0 + t * (x1 - x0))), static_cast<int>(std::lround(y0 + t * (y1 - y0))), 1, 1, color);
+            fill(static_cast<int>(std::lround(x0 + t * (x1 - x0))), static_cast<int>(std::lround(y0 + t * (y1 - y0))),
+                 1, 1, color);
         }
     }
 
@@ -99,7 +103,8 @@ struct TreeLayout {
 
 std::string label_of(const FlattenedTree& tree, NodeIndex index) {
     const materials::Node& node = tree.visible_tree.nodes[index];
-    std::string label = node.name.empty() ? node.kind == NodeKind::slab ? fmt::format("slab {}", index) : std::string(name_of(node.kind))
+    std::string label = node.name.empty() ? node.kind == NodeKind::slab ? fmt::format("slab {}", index)
+                                                                        : std::string(name_of(node.kind))
                                           : node.name;
     if (node.kind == NodeKind::mix || node.kind == NodeKind::coverage) label += fmt::format(" {:.2g}", node.amount);
     if (label.size() > 22) label = label.substr(0, 20) + "..";
@@ -138,7 +143,8 @@ void draw_tree(Canvas& canvas, int left, int top, const FlattenedTree& tree, con
         const std::string label = label_of(tree, index);
         const int width = text_width(label) + 12;
         const bool is_slab = tree.visible_tree.nodes[index].kind == NodeKind::slab;
-        canvas.box(left + center.x - width / 2, top + center.y - 9, width, 18, ink, is_slab ? Color(1.0f) : Color(0.7f, 0.8f, 0.9f));
+        canvas.box(left + center.x - width / 2, top + center.y - 9, width, 18, ink,
+                   is_slab ? Color(1.0f) : Color(0.7f, 0.8f, 0.9f));
         canvas.text(left + center.x - width / 2 + 6, top + center.y - 4, label);
     }
 }
@@ -185,14 +191,18 @@ Image material_sheet(const std::string& title, const FlattenedTree& tree, const 
         const int left = margin + static_cast<int>(i) * cell;
         canvas.picture(left, balls_top, steps[i].ball);
         for (std::size_t line = 0; line < steps[i].captions.size(); ++line)
-            canvas.text(left, balls_top + static_cast<int>(steps[i].ball.height) + 6 + static_cast<int>(line) * line_height, steps[i].captions[line]);
+            canvas.text(left,
+                        balls_top + static_cast<int>(steps[i].ball.height) + 6 + static_cast<int>(line) * line_height,
+                        steps[i].captions[line]);
     }
     for (int i = 0; i < plots; ++i) {
         const int left = margin + i * cell;
         draw_lobe(canvas, left, plots_top, shaded, static_cast<std::size_t>(i));
-        canvas.text(left, plots_top + plot / 2 + 8, label_of(tree, tree.topology.closures[static_cast<std::size_t>(i)].node));
+        canvas.text(left, plots_top + plot / 2 + 8,
+                    label_of(tree, tree.topology.closures[static_cast<std::size_t>(i)].node));
         const glm::dvec3 weight = shaded.closures[static_cast<std::size_t>(i)].path.weight;
-        canvas.text(left, plots_top + plot / 2 + 8 + line_height, fmt::format("weight {:.2f} {:.2f} {:.2f}", weight.x, weight.y, weight.z), faint);
+        canvas.text(left, plots_top + plot / 2 + 8 + line_height,
+                    fmt::format("weight {:.2f} {:.2f} {:.2f}", weight.x, weight.y, weight.z), faint);
     }
     return canvas.take();
 }

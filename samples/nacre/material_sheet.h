@@ -18,8 +18,9 @@ struct MaterialSheetStep {
     Image ball;
 };
 
-/// The tree, a ball for each step, and for each closure of the material as authored its lobe in the plane of incidence at 45
-/// degrees, in logarithmic length.
-Image material_sheet(const std::string& title, const materials::FlattenedTree& tree, const std::vector<MaterialSheetStep>& steps);
+/// The tree, a ball for each step, and for each closure of the material as authored its lobe in the plane of incidence
+/// at 45 degrees, in logarithmic length.
+Image material_sheet(const std::string& title, const materials::FlattenedTree& tree,
+                     const std::vector<MaterialSheetStep>& steps);
 
 }  // namespace nacre::command

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/description_tree.h"
 
-#include <cmath>
 #include <gtest/gtest.h>
+
+#include <cmath>
 #include <limits>
 
 #include "materials/evaluation.h"
@@ -71,7 +72,8 @@ TEST(DescriptionTree, ExtensionsBecomeSlabsAndOperators) {
     material.sheen = Sheen{.color = {0.4f, 0.2f, 0.1f}, .roughness = 0.6f};
     material.iridescence = Iridescence{.factor = 1.0f, .ior = 1.4f, .thickness_maximum = 350e-9f};
     material.transmission = Transmission{.factor = 0.25f};
-    material.volume = Volume{.thickness = 0.01f, .attenuation_distance = 0.02f, .attenuation_color = {0.5f, 1.0f, 0.0f}};
+    material.volume =
+        Volume{.thickness = 0.01f, .attenuation_distance = 0.02f, .attenuation_color = {0.5f, 1.0f, 0.0f}};
     material.emissive = {1.0f, 2.0f, 3.0f};
     material.emissive_strength = 2.0f;
     const FlattenedTree tree = flat(material);
@@ -96,7 +98,8 @@ TEST(DescriptionTree, TexturesAreWhereTheyBelong) {
     material.base_color_texture = texture;
     material.metallic_roughness_texture = texture;
     material.normal_texture = texture;
-    material.clearcoat = Clearcoat{.factor = 1.0f, .texture = texture, .roughness_texture = texture, .normal_texture = texture};
+    material.clearcoat =
+        Clearcoat{.factor = 1.0f, .texture = texture, .roughness_texture = texture, .normal_texture = texture};
     const Tree tree = tree_of(material);
     EXPECT_TRUE(validate(tree));
     EXPECT_TRUE(tree.frames[0].normal_texture.present());
@@ -108,7 +111,8 @@ TEST(DescriptionTree, TexturesAreWhereTheyBelong) {
 
 // Whatever a file says, the tree is valid.
 TEST(DescriptionTree, WildValuesAreClamped) {
-    const float wild[] = {std::numeric_limits<float>::quiet_NaN(), -1.0f, 1e30f, std::numeric_limits<float>::infinity()};
+    const float wild[] = {std::numeric_limits<float>::quiet_NaN(), -1.0f, 1e30f,
+                          std::numeric_limits<float>::infinity()};
     for (const float value : wild) {
         MaterialDescription material{.name = "wild"};
         material.base_color = glm::vec4(value);
@@ -119,9 +123,11 @@ TEST(DescriptionTree, WildValuesAreClamped) {
         material.sheen = Sheen{.color = glm::vec3(value), .roughness = value};
         material.anisotropy = Anisotropy{.strength = value, .rotation = 0.0f};
         material.transmission = Transmission{.factor = value};
-        material.volume = Volume{.thickness = value, .attenuation_distance = value, .attenuation_color = glm::vec3(value)};
+        material.volume =
+            Volume{.thickness = value, .attenuation_distance = value, .attenuation_color = glm::vec3(value)};
         material.specular = Specular{.factor = value, .color = glm::vec3(value)};
-        material.iridescence = Iridescence{.factor = value, .ior = value, .thickness_minimum = value, .thickness_maximum = value};
+        material.iridescence =
+            Iridescence{.factor = value, .ior = value, .thickness_minimum = value, .thickness_maximum = value};
         const Tree tree = tree_of(material);
         const auto valid = validate(tree);
         EXPECT_TRUE(valid) << value << ": " << valid.error().message();

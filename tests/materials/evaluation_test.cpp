@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/evaluation.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cmath>
-#include <gtest/gtest.h>
 #include <limits>
 #include <random>
 
@@ -21,7 +22,8 @@ glm::dvec3 view_at(double cosine) { return {std::sqrt(1.0 - cosine * cosine), 0.
 TEST(TreeEnergy, NothingIsCreated) {
     std::mt19937 random(5);
     for (std::uint32_t i = 0; i < 500; ++i) {
-        const Tree tree = random_tree(random, {.slabs = 1 + i % 6, .features = lobes | slab_medium | slab_edge_coverage});
+        const Tree tree =
+            random_tree(random, {.slabs = 1 + i % 6, .features = lobes | slab_medium | slab_edge_coverage});
         const auto flat = flatten(tree);
         ASSERT_TRUE(flat) << flat.error().message();
         for (const double cosine : cosines) {
@@ -51,7 +53,8 @@ TEST(TreeEnergy, NothingIsLostWhereNothingAbsorbs) {
     }
 }
 
-// The albedo is the integral of what is reflected, mirrors aside: over a grid of directions, for trees with tinted layers.
+// The albedo is the integral of what is reflected, mirrors aside: over a grid of directions, for trees with tinted
+// layers.
 TEST(TreeEnergy, AlbedoIsTheIntegralOfTheLobes) {
     std::mt19937 random(7);
     constexpr int rings = 400, sectors = 200;
@@ -73,12 +76,14 @@ TEST(TreeEnergy, AlbedoIsTheIntegralOfTheLobes) {
             integral *= 2.0 * 3.14159265358979 / (rings * sectors);
             const glm::dvec3 albedo = directional_albedo(shaded, 48);
             for (int channel = 0; channel < 3; ++channel)
-                EXPECT_NEAR(albedo[channel], integral[channel], 0.01 * integral[channel] + 2e-4) << topology_text(flat->visible_tree);
+                EXPECT_NEAR(albedo[channel], integral[channel], 0.01 * integral[channel] + 2e-4)
+                    << topology_text(flat->visible_tree);
         }
     }
 }
 
-// A coat that absorbs takes Beer-Lambert's share on the way in and on the way out, along refracted directions (index 1.5).
+// A coat that absorbs takes Beer-Lambert's share on the way in and on the way out, along refracted directions
+// (index 1.5).
 TEST(TreeLayer, ATintedCoatTakesWhatItsMediumTakes) {
     constexpr double mean_free_path = 2e-3, thickness = 1e-3;
     for (const double cos_view : {1.0, 0.5}) {
@@ -103,7 +108,8 @@ TEST(TreeLayer, ATintedCoatTakesWhatItsMediumTakes) {
             const double expected =
                 std::exp(-thickness / mean_free_path * (1.0 / refracted(cos_view) + 1.0 / refracted(cos_light)));
             const double clear = seen(std::numeric_limits<float>::infinity());
-            EXPECT_NEAR(seen(static_cast<float>(mean_free_path)) / clear, expected, 2e-3 * expected) << cos_view << " " << cos_light;
+            EXPECT_NEAR(seen(static_cast<float>(mean_free_path)) / clear, expected, 2e-3 * expected)
+                << cos_view << " " << cos_light;
         }
     }
 }
@@ -132,7 +138,8 @@ TEST(TreeLayer, ACoatDarkensWhatIsBelow) {
     coat.mean_free_path = glm::vec3(std::numeric_limits<float>::infinity());
     tree.layer(tree.add(coat), base);
     const ShadedTree shaded = shade(*flatten(tree), view_at(1.0));
-    // Schlick's mean reflectance from above, and the share of the diffuse light inside that leaves through an index of 1.5.
+    // Schlick's mean reflectance from above, and the share of the diffuse light inside that leaves through an index
+    // of 1.5.
     const double mean = 0.04 + 0.96 / 21.0, internal = 1.0 - (1.0 - mean) / 2.25;
     const double expected = (1.0 - 0.04) * 0.5 * (1.0 - internal) / (1.0 - 0.5 * internal);
     const ShadedClosure& below = shaded.closures[1];

@@ -14,8 +14,8 @@ struct RandomTreeDesc {
     bool is_lossless = false;    ///< White albedo, no tint and no absorption anywhere; everything below is opaque.
 };
 
-/// A valid tree of any topology that the operators can make of so many slabs; the same for the same state of `random` on all
-/// machines. Layers have a medium on top where `features` has one.
+/// A valid tree of any topology that the operators can make of so many slabs; the same for the same state of `random`
+/// on all machines. Layers have a medium on top where `features` has one.
 [[nodiscard]] Tree random_tree(std::mt19937& random, const RandomTreeDesc& desc);
 
 }  // namespace nacre::materials

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/simplification.h"
 
-#include <algorithm>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
 #include <map>
 #include <random>
 
@@ -25,8 +26,9 @@ std::uint32_t bytes_of(std::string_view name) {
 // The rows of storage of the Substrate talk; each holds all that those before it hold.
 TEST(Storage, RowsTakeAtMostWhatTheTalkStates) {
     const std::pair<const char*, std::uint32_t> rows[] = {
-        {"simple", 12},        {"single", 16},       {"single-haze-f90", 20}, {"single-fuzz", 24},    {"single-sss", 28},
-        {"complex-aniso", 28}, {"complex-coat", 40}, {"special-speclut", 44}, {"special-glints", 60}, {"complex-opal", 76}};
+        {"simple", 12},         {"single", 16},        {"single-haze-f90", 20}, {"single-fuzz", 24},
+        {"single-sss", 28},     {"complex-aniso", 28}, {"complex-coat", 40},    {"special-speclut", 44},
+        {"special-glints", 60}, {"complex-opal", 76}};
     std::uint32_t features = 0, closures = 0;
     for (const auto& [name, bytes] : rows) {
         EXPECT_LE(bytes_of(name), bytes) << name;
@@ -52,7 +54,8 @@ TEST(Storage, LayoutHasNoFieldTwiceAndCountsItsBits) {
         for (const StorageField& field : layout.fields) {
             bits += field.bits;
             EXPECT_TRUE(field.closure == StorageLayout::no_closure || field.closure < flat->topology.closures.size());
-            if (field.closure != StorageLayout::no_closure) EXPECT_EQ(++seen[std::pair(field.closure, field.name)], 1) << field.name;
+            if (field.closure != StorageLayout::no_closure)
+                EXPECT_EQ(++seen[std::pair(field.closure, field.name)], 1) << field.name;
         }
         EXPECT_LE(bits, 32 * layout.material_words());
         EXPECT_TRUE(layout.material_words() == 2 || bits > 32 * (layout.material_words() - 1));
@@ -97,7 +100,8 @@ TEST(Simplification, StopsAsSoonAsTheBudgetHolds) {
 TEST(Simplification, AnyTreeBecomesOneClosure) {
     std::mt19937 random(9);
     for (std::uint32_t i = 0; i < 60; ++i) {
-        const Tree tree = random_tree(random, {.slabs = 1 + i % 7, .features = slab_fuzz | slab_medium | slab_anisotropy});
+        const Tree tree =
+            random_tree(random, {.slabs = 1 + i % 7, .features = slab_fuzz | slab_medium | slab_anisotropy});
         const auto result = simplify_fully(tree);
         ASSERT_TRUE(result) << result.error().message();
         EXPECT_TRUE(result->fits);
@@ -118,7 +122,8 @@ TEST(Simplification, ErrorsAreThoseOfTheBlend) {
         tree.mix(x, y, 0.5f);
         return simplify_fully(tree)->steps.back();
     };
-    const Slab red{.albedo = {0.8f, 0.1f, 0.1f}}, metal{.f0 = glm::vec3(0.9f), .roughness = 0.1f, .albedo = glm::vec3(0.0f)};
+    const Slab red{.albedo = {0.8f, 0.1f, 0.1f}},
+        metal{.f0 = glm::vec3(0.9f), .roughness = 0.1f, .albedo = glm::vec3(0.0f)};
     EXPECT_LT(error(red, red).albedo_error, 1e-9);
     EXPECT_LT(error(red, red).lobe_error, 1e-9);
     EXPECT_GT(error(red, metal).lobe_error, 0.05);

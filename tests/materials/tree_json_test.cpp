@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/tree_json.h"
 
-#include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -45,8 +46,10 @@ TEST(TreeJson, ReadsEveryPart) {
     EXPECT_EQ(layer.thickness, 1e-4f);
     const Node& coverage = tree.nodes[layer.first];
     ASSERT_EQ(coverage.textures.size(), 1u);
-    EXPECT_EQ(coverage.textures[0], (TextureInput{.field = "amount", .texture = {.image = 0, .sampler = 0}, .channel = 1,
-                                                  .scale = -1.0f, .bias = 1.0f}));
+    EXPECT_EQ(
+        coverage.textures[0],
+        (TextureInput{
+            .field = "amount", .texture = {.image = 0, .sampler = 0}, .channel = 1, .scale = -1.0f, .bias = 1.0f}));
     const Slab& coat = tree.nodes[coverage.first].slab;
     EXPECT_EQ(coat.features, slab_medium);
     EXPECT_EQ(coat.mean_free_path, glm::vec3(0.001f, 0.002f, std::numeric_limits<float>::infinity()));
@@ -79,18 +82,23 @@ TEST(TreeJson, TextRoundTrips) {
                     field.set(slab, channel, field.minimum + uniform() * (maximum - field.minimum));
                 }
             }
-            const NodeIndex node = tree.add(slab, i % 2 == 0 ? "" : "named", static_cast<std::uint32_t>(random() % tree.frames.size()));
+            const NodeIndex node =
+                tree.add(slab, i % 2 == 0 ? "" : "named", static_cast<std::uint32_t>(random() % tree.frames.size()));
             if (uniform() < 0.5f)
-                tree.nodes[node].textures.push_back({.field = "roughness", .texture = {.image = 0, .sampler = 0, .uv_set = 1},
-                                                     .channel = 3, .scale = uniform(), .bias = uniform()});
+                tree.nodes[node].textures.push_back({.field = "roughness",
+                                                     .texture = {.image = 0, .sampler = 0, .uv_set = 1},
+                                                     .channel = 3,
+                                                     .scale = uniform(),
+                                                     .bias = uniform()});
             open.push_back(node);
         }
         while (open.size() > 1) {
             const NodeIndex a = open.back();
             open.pop_back();
             const NodeIndex b = open.back();
-            open.back() = uniform() < 0.3f ? tree.coverage(tree.mix(a, b, uniform()), uniform())
-                          : uniform() < 0.5f ? tree.layer(a, b, uniform()) : tree.layer(a, b);
+            open.back() = uniform() < 0.3f   ? tree.coverage(tree.mix(a, b, uniform()), uniform())
+                          : uniform() < 0.5f ? tree.layer(a, b, uniform())
+                                             : tree.layer(a, b);
             tree.nodes.back().parameter_blend = tree.nodes.back().kind == NodeKind::layer && uniform() < 0.5f;
         }
         const MaterialFile file{.tree = tree, .images = {"a.png"}};
@@ -121,7 +129,9 @@ TEST(TreeJson, FaultsAreNamedWithTheirPlace) {
         const auto result = parse_material(text, "m.json");
         return result ? std::string("no error") : result.error().message();
     };
-    const auto root = [&](std::string_view node) { return message(R"({"nacre_material": 1, "root": )" + std::string(node) + "}"); };
+    const auto root = [&](std::string_view node) {
+        return message(R"({"nacre_material": 1, "root": )" + std::string(node) + "}");
+    };
     EXPECT_THAT(message("{\n  \"nacre_material\": 1,,\n}"), HasSubstr("'m.json': line 2, column 23"));
     EXPECT_THAT(message(""), HasSubstr("no JSON"));
     EXPECT_THAT(message("[]"), HasSubstr("it is a array, not an object"));

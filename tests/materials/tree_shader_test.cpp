@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/tree_shader.h"
 
-#include <cmath>
-#include <cstring>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
 #include <memory>
 #include <random>
 
@@ -74,20 +75,25 @@ class TreeShaderTest : public testing::TestWithParam<const char*> {
 
     Expected<std::vector<glm::vec4>> run(const TreeShader& tree, const std::vector<glm::vec4>& inputs) {
         rhi::ShaderCompiler compiler({.embedded = {embedded_files()}});
-        NACRE_TRY(const rhi::ShaderDesc text, compiler.compile({.path = "tree.comp", .text = tree.defines + shader_text + tree.glsl + main_text}));
+        NACRE_TRY(const rhi::ShaderDesc text,
+                  compiler.compile({.path = "tree.comp", .text = tree.defines + shader_text + tree.glsl + main_text}));
         NACRE_TRY(const rhi::Shader shader, device_->create_shader(text));
-        NACRE_TRY(const rhi::ComputePipeline pipeline, device_->create_compute_pipeline({.shader = shader, .name = "tree"}));
+        NACRE_TRY(const rhi::ComputePipeline pipeline,
+                  device_->create_compute_pipeline({.shader = shader, .name = "tree"}));
         const auto make = [&](std::size_t size, const void* data, const char* name) -> Expected<rhi::Buffer> {
-            NACRE_TRY(rhi::Buffer buffer, device_->create_buffer({.size = size, .usage = rhi::BufferUsage::storage, .name = name}));
+            NACRE_TRY(rhi::Buffer buffer,
+                      device_->create_buffer({.size = size, .usage = rhi::BufferUsage::storage, .name = name}));
             if (data != nullptr)
                 NACRE_CHECK(device_->write_buffer(buffer, std::span(static_cast<const std::byte*>(data), size)));
             return buffer;
         };
         NACRE_TRY(const rhi::Buffer directions, make(inputs.size() * sizeof(glm::vec4), inputs.data(), "directions"));
         NACRE_TRY(const rhi::Buffer parameters, make(tree.parameters.size() * 4, tree.parameters.data(), "parameters"));
-        NACRE_TRY(const rhi::Buffer table_0, make(interface_table().size_bytes(), interface_table().data(), "interface"));
+        NACRE_TRY(const rhi::Buffer table_0,
+                  make(interface_table().size_bytes(), interface_table().data(), "interface"));
         NACRE_TRY(const rhi::Buffer table_1, make(medium_table().size_bytes(), medium_table().data(), "medium"));
-        NACRE_TRY(const rhi::Buffer table_2, make(anisotropy_table().size_bytes(), anisotropy_table().data(), "anisotropy"));
+        NACRE_TRY(const rhi::Buffer table_2,
+                  make(anisotropy_table().size_bytes(), anisotropy_table().data(), "anisotropy"));
         NACRE_TRY(const rhi::Buffer results, make(inputs.size() * sizeof(glm::vec4), nullptr, "results"));
         NACRE_TRY(const rhi::BindGroupLayout layout, device_->bind_group_layout(pipeline, 0));
         NACRE_TRY(const rhi::BindGroup group,
@@ -118,7 +124,8 @@ class TreeShaderTest : public testing::TestWithParam<const char*> {
         double worst = 0.0;
         std::uint32_t worst_at = 0;
         for (std::uint32_t i = 0; i < pairs; ++i) {
-            const glm::dvec3 view = glm::normalize(glm::dvec3(inputs[2 * i])), light = glm::normalize(glm::dvec3(inputs[2 * i + 1]));
+            const glm::dvec3 view = glm::normalize(glm::dvec3(inputs[2 * i])),
+                             light = glm::normalize(glm::dvec3(inputs[2 * i + 1]));
             const ShadedTree shaded = shade(host_tree, view);
             const glm::dvec3 expected = reflected(shaded, light);
             for (int channel = 0; channel < 3; ++channel) {
@@ -143,8 +150,8 @@ TEST_P(TreeShaderTest, ShadesAsTheHostDoes) {
     std::mt19937 random(11);
     for (const std::uint32_t slabs : {1u, 2u, 4u}) {
         const Tree tree = random_tree(random, {.slabs = slabs,
-                                               .features = slab_anisotropy | slab_f90 | slab_f82 | slab_second_lobe | slab_fuzz |
-                                                           slab_medium | slab_edge_coverage});
+                                               .features = slab_anisotropy | slab_f90 | slab_f82 | slab_second_lobe |
+                                                           slab_fuzz | slab_medium | slab_edge_coverage});
         const auto flat = flatten(tree);
         ASSERT_TRUE(flat) << flat.error().message();
         compare(*flat, *flat, random);
@@ -181,7 +188,9 @@ TEST_P(TreeShaderTest, TexturesMultiplyTheirInputs) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, TreeShaderTest, testing::Values("cpu:consistent", "vulkan", "gl"),
-                         [](const auto& info) { return std::string(info.param).substr(0, std::string(info.param).find(':')); });
+                         [](const auto& info) {
+                             return std::string(info.param).substr(0, std::string(info.param).find(':'));
+                         });
 
 // Materials of one topology share a shader, whatever their numbers are.
 TEST(TreeShader, TextDependsOnTopologyAndFeaturesOnly) {

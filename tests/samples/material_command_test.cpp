@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <filesystem>
-#include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "core/image.h"
@@ -19,14 +20,16 @@ TEST(MaterialCommand, ReportsBytesAndSteps) {
     const CommandResult result = run_nacre({"material", "coated-carbon", "--profile", "mobile", "--json", "-"});
     ASSERT_EQ(result.exit_code, 0) << result.errors;
     const json report = json::parse(result.output);
-    for (const char* key : {"name", "profile", "bytes_requested", "bytes", "closures", "bases", "complexity", "features", "steps"})
+    for (const char* key :
+         {"name", "profile", "bytes_requested", "bytes", "closures", "bases", "complexity", "features", "steps"})
         EXPECT_TRUE(report.contains(key)) << key;
     EXPECT_EQ(report["name"], "coated-carbon");
     EXPECT_LE(report["bytes"], 12);
     EXPECT_EQ(report["closures"], 1);
     ASSERT_GE(report["steps"].size(), 3u);
     for (const json& step : report["steps"]) {
-        for (const char* key : {"what", "bytes", "closures", "albedo_error", "image_error"}) EXPECT_TRUE(step.contains(key)) << key;
+        for (const char* key : {"what", "bytes", "closures", "albedo_error", "image_error"})
+            EXPECT_TRUE(step.contains(key)) << key;
     }
     EXPECT_EQ(report["steps"][0]["bytes"], report["bytes_requested"]);
     EXPECT_EQ(report["steps"][0]["image_error"], 0.0);
@@ -58,7 +61,8 @@ TEST(MaterialCommand, DrawsAPicture) {
     ASSERT_TRUE(picture) << picture.error().message();
     // The ball is golden: among the pixels are many with far more red than blue.
     std::size_t golden = 0;
-    for (std::size_t i = 0; i < picture->texel_count(); ++i) golden += picture->bytes[3 * i] > picture->bytes[3 * i + 2] + 60;
+    for (std::size_t i = 0; i < picture->texel_count(); ++i)
+        golden += picture->bytes[3 * i] > picture->bytes[3 * i + 2] + 60;
     EXPECT_GT(golden, 500u);
 }
 

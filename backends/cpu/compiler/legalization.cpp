@@ -27,6 +27,9 @@ constexpr std::uint64_t most_rewritten_blocks = 3'000;
 /// Where even that does not help (functions with barriers are always inlined).
 constexpr std::uint64_t most_instructions = 2'000'000;
 
+/// The passes for local variables turn a read of one element into one of the whole variable: not for more scalars than this.
+constexpr std::uint64_t most_local_scalars = 4096;
+
 /// Which functions stay functions: those with FunctionControl::DontInline, by which `InlineExhaustivePass` and `Module` go.
 class InliningPlan {
   public:
@@ -34,6 +37,11 @@ class InliningPlan {
         std::unordered_map<std::uint32_t, spv::StorageClass> pointers;
         std::unordered_map<std::uint32_t, std::uint32_t> pointees;
         std::unordered_map<std::uint32_t, Op> types;
+        std::unordered_map<std::uint32_t, std::uint64_t> scalars, constants;
+        const auto scalars_of = [&](std::uint32_t type) {
+            const auto found = scalars.find(type);
+            return found == scalars.end() ? std::uint64_t{1} : found->second;
+        };
         std::vector<std::uint32_t> entries;
         FunctionSize* function = nullptr;
         for (const rhi::spirv::Instruction& at : rhi::spirv::instructions(words)) {
@@ -44,6 +52,22 @@ class InliningPlan {
             }
             if (function) ++function->own, ++own_instructions_;
             if (op == Op::OpLabel) ++own_blocks_;
+            if (op == Op::OpConstant) constants[at.operand(1)] = at.operand(2);
+            if (op == Op::OpTypeArray) {
+                // A length that may be specialized may be any.
+                const auto length = constants.find(at.operand(2));
+                scalars[at.operand(0)] = std::min(scalars_of(at.operand(1)), most_local_scalars + 1) *
+                                         (length == constants.end() ? most_local_scalars + 1 : length->second);
+            }
+            if (op == Op::OpTypeStruct) {
+                std::uint64_t& sum = scalars[at.operand(0)];
+                for (std::size_t i = 1; i + 1 < at.words.size(); ++i) sum += std::min(scalars_of(at.operand(i)), most_local_scalars + 1);
+            }
+            if (op == Op::OpTypePointer) {
+                const auto storage = static_cast<spv::StorageClass>(at.operand(1));
+                const bool is_local = storage == spv::StorageClass::Function || storage == spv::StorageClass::Private;
+                has_large_variables_ |= is_local && scalars_of(at.operand(2)) > most_local_scalars;
+            }
             switch (op) {
                 case Op::OpEntryPoint: entries.push_back(at.operand(1)); break;
                 case Op::OpTypeArray: case Op::OpTypeRuntimeArray: case Op::OpTypeRayQueryKHR: case Op::OpTypeImage: case Op::OpTypeSampler:
@@ -98,6 +122,8 @@ class InliningPlan {
 
     /// Pointers may be loaded from variables: SPIRV-Tools' passes for local variables take such a load for one of the value.
     [[nodiscard]] bool has_variable_pointers() const { return has_variable_pointers_; }
+    /// A variable of a function or an invocation holds more than `most_local_scalars`.
+    [[nodiscard]] bool has_large_variables() const { return has_large_variables_; }
     /// Basic blocks in it, about.
     [[nodiscard]] std::uint64_t blocks() const { return own_blocks_ * instructions_ / std::max<std::uint64_t>(own_instructions_, 1); }
 
@@ -165,7 +191,7 @@ class InliningPlan {
     std::unordered_map<std::uint32_t, FunctionSize> functions_;
     std::vector<std::uint32_t> order_;
     std::vector<FunctionSize*> callees_first_;
-    bool has_variable_pointers_ = false;
+    bool has_variable_pointers_ = false, has_large_variables_ = false;
     std::uint64_t instructions_ = 0, largest_entry_ = 0, own_instructions_ = 0, own_blocks_ = 0;
 };
 
@@ -218,14 +244,15 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
         .RegisterPass(spvtools::CreateInlineExhaustivePass())
         .RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
         .RegisterPass(spvtools::CreatePrivateToLocalPass());
-    if (!plan.has_variable_pointers() && !options.keeps_variables)
+    const bool rewrites_variables = !plan.has_variable_pointers() && !plan.has_large_variables() && !options.keeps_variables;
+    if (rewrites_variables)
         optimizer.RegisterPass(spvtools::CreateScalarReplacementPass(100))
             .RegisterPass(spvtools::CreateLocalAccessChainConvertPass())
             // Access chains that nothing uses any more would keep variables from becoming values.
             .RegisterPass(spvtools::CreateAggressiveDCEPass(true))
             .RegisterPass(spvtools::CreateLocalSingleBlockLoadStoreElimPass())
             .RegisterPass(spvtools::CreateLocalSingleStoreElimPass());
-    if (plan.blocks() <= most_rewritten_blocks && !plan.has_variable_pointers() && !options.keeps_variables)
+    if (rewrites_variables && plan.blocks() <= most_rewritten_blocks)
         optimizer.RegisterPass(spvtools::CreateSSARewritePass());
     optimizer.RegisterPass(spvtools::CreateAggressiveDCEPass(true));
     spvtools::OptimizerOptions optimizer_options;

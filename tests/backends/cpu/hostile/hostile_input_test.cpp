@@ -290,6 +290,23 @@ TEST_P(HostileInput, DeeplyNestedTypes) {
               Outcome::refused);
 }
 
+// A place in a large array, written in loops, is not the whole array as so many values.
+TEST_P(HostileInput, PlacesInLargeArraysAreNotWholeArrays) {
+    EXPECT_EQ(run_glsl(R"(
+        layout(local_size_x = 16) in;
+        layout(set = 0, binding = 0) buffer R { uint r[]; };
+        uint a[200000];
+        void main() {
+            for (uint i = 0u; i < 4u; ++i)
+                for (uint k = 0u; k < 3u; ++k) {
+                    if (((i + gl_LocalInvocationIndex) & 1u) == 0u) a[7] += k;
+                    switch (k) { case 0u: a[5] = i; case 1u: a[9] += 1u; break; default: a[11] = a[7]; }
+                }
+            r[0] = a[5] + a[7] + a[9] + a[11];
+        })"),
+              Outcome::ran) << reason();
+}
+
 TEST_P(HostileInput, EnormousNumbersOfEverything) {
     const auto ends_well = [&](const std::string& text) {
         const Outcome outcome = run(assemble(text));

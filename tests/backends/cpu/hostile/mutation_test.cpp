@@ -3,7 +3,7 @@
 // does not work.
 //
 //     cpu_mutation_test                                            as many modules as a short test has time for
-//     cpu_mutation_test --seed=1000 --count=100000 --chains --folder=/tmp/found
+//     cpu_mutation_test --seed=1000 --count=100000 --chains --folder=found
 //     cpu_mutation_test --seed=1234 --count=1 --in-process         one of them in a debugger
 //     cpu_mutation_test --run=found.spv                            one module on all devices
 //     cpu_mutation_test --write-seeds=tests/seeds/cpu_spirv_fuzzer  the modules that others are made from
