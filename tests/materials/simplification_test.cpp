@@ -10,10 +10,12 @@
 
 #include "materials/builtin_materials.h"
 #include "materials/storage.h"
-#include "tests/materials/random_tree.h"
+#include "measure/random_tree.h"
 
 namespace nacre::materials {
 namespace {
+
+using measure::random_tree;
 
 std::uint32_t bytes_of(std::string_view name) {
     const auto tree = make_builtin_material(name);

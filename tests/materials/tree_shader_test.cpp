@@ -16,10 +16,12 @@
 #include "rhi/device.h"
 #include "rhi/shader_compiler.h"
 #include "samples/backends.h"
-#include "tests/materials/random_tree.h"
+#include "measure/random_tree.h"
 
 namespace nacre::materials {
 namespace {
+
+using measure::random_tree;
 
 constexpr std::uint32_t pairs = 256;
 

@@ -5,7 +5,7 @@
 
 #include "materials/tree.h"
 
-namespace nacre::materials {
+namespace nacre::measure {
 
 /// What random trees are made of.
 struct RandomTreeDesc {
@@ -16,6 +16,6 @@ struct RandomTreeDesc {
 
 /// A valid tree of any topology that the operators can make of so many slabs; the same for the same state of `random`
 /// on all machines. Layers have a medium on top where `features` has one.
-[[nodiscard]] Tree random_tree(std::mt19937& random, const RandomTreeDesc& desc);
+[[nodiscard]] materials::Tree random_tree(std::mt19937& random, const RandomTreeDesc& desc);
 
-}  // namespace nacre::materials
+}  // namespace nacre::measure
