@@ -80,7 +80,7 @@ StabilityFigures judge(const StabilitySubject& subject, const Batch& batch) {
     const std::size_t light_scale = slot_of(subject, ResultKind::light_scale),
                       sample_scale = slot_of(subject, ResultKind::sample_scale),
                       no_density = slot_of(subject, ResultKind::no_density);
-    Worst worst, worst_closed, worst_reciprocity;
+    Worst worst, worst_closed, worst_host, worst_reciprocity;
     std::vector<double> closed(width);
     for (std::uint32_t i = 0; i < batch.count; ++i) {
         const std::uint32_t* const words = &batch.points[std::size_t{i} * subject.shader.point_words];
@@ -132,6 +132,22 @@ StabilityFigures judge(const StabilitySubject& subject, const Batch& batch) {
         }
         const int angle = decade_bin(subject.lower_cosine(words), -StabilityFigures::angle_bins, StabilityFigures::angle_bins);
         figures.error_by_angle[angle] = std::max(figures.error_by_angle[angle], largest);
+        // One of those that share a set of parameters.
+        if (subject.on_host && i % 64 == 17) {
+            std::ranges::fill(closed, std::numeric_limits<double>::quiet_NaN());
+            const std::size_t set = subject.shader.parameter_words;
+            subject.on_host(words, set > 0 ? &batch.parameters[i / 64 * set] : nullptr, closed.data());
+            for (std::size_t k = 0; k < width; ++k) {
+                if (std::isnan(closed[k])) continue;
+                const double scale = subject.results[k] == ResultKind::lobe ? at_light : 1.0;
+                const double difference = std::abs(exact[k] - closed[k]);
+                // Tables are unpacked in single precision on the device.
+                worst_host.add(std::isnan(difference) ? infinity
+                                                      : std::max(difference - floor_of_scale * scale, 0.0) /
+                                                            std::max(std::abs(closed[k]), floor_of_scale * scale),
+                               i, k, exact[k], closed[k]);
+            }
+        }
         if (subject.closed_form && i % 8 == 0) {
             std::ranges::fill(closed, std::numeric_limits<double>::quiet_NaN());
             subject.closed_form(words, closed.data());
@@ -144,6 +160,8 @@ StabilityFigures judge(const StabilitySubject& subject, const Batch& batch) {
             }
         }
     }
+    figures.host_error = worst_host.error;
+    figures.host_at = worst_host.text(subject, batch);
     figures.max_rel_error = worst.error;
     figures.at = worst.text(subject, batch);
     figures.closed_error = worst_closed.error;
@@ -209,8 +227,6 @@ void for_all(std::size_t count, const Function& function) {
             for (std::size_t i = next++; i < count; i = next++) function(i);
         });
 }
-
-glm::dvec3 stability_tint(std::uint32_t, glm::dvec2 at) { return {at.x, 1.0 - 0.5 * at.y, 0.5 + 0.5 * at.x * at.y}; }
 
 Expected<void> measure_furnaces(const StabilitySubject& subject, bool is_short, StabilityClosure& row) {
     if (subject.furnace) {
@@ -318,6 +334,7 @@ void StabilityFigures::add(const StabilityFigures& other) {
     if (other.max_rel_error > max_rel_error) max_rel_error = other.max_rel_error, at = other.at;
     if (other.closed_error > closed_error) closed_error = other.closed_error, closed_at = other.closed_at;
     if (other.reciprocity > reciprocity) reciprocity = other.reciprocity, reciprocity_at = other.reciprocity_at;
+    if (other.host_error > host_error) host_error = other.host_error, host_at = other.host_at;
     agreement = std::max(agreement, other.agreement);
     weight_max = std::max(weight_max, other.weight_max);
     for (int i = 0; i < error_bins; ++i) errors[i] += other.errors[i];
@@ -339,7 +356,7 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
     }
     const auto start = Clock::now();
     StabilityReport report{.desc = desc};
-    auto reference = instance.create_device({.backend = "cpu:double"});
+    auto reference = instance.create_device({.backend = "cpu:double:lanes=4"});
     if (!reference) return std::unexpected(reference.error());
     std::vector<std::unique_ptr<rhi::Device>> devices;
     for (const std::string& backend : desc.backends) {

@@ -45,6 +45,8 @@ struct StabilityFigures {
     std::string at;              ///< The point where it occurs.
     double closed_error = 0.0;   ///< Against closed forms.
     std::string closed_at;
+    double host_error = 0.0;     ///< Of the reference, against the same text compiled for the host.
+    std::string host_at;
     double reciprocity = 0.0;    ///< Relative defect between two directions.
     std::string reciprocity_at;
     double agreement = 0.0;      ///< Of sample, value and density.
@@ -77,7 +79,6 @@ struct StabilityReport {
     std::vector<StabilityClosure> closures;
     std::uint32_t trees = 0;
     std::uint64_t samples = 0;
-    double host_error = 0.0;  ///< Of `cpu:double` against the same text compiled for the host, over a part of the points.
     double seconds = 0.0;
 };
 

@@ -95,6 +95,24 @@ StabilitySubject closure_subject(std::string name, std::string what, std::uint32
         put_point(point, words);
     };
     subject.describe = describe_closure;
+    // The models of the host's library are those of a shader without defines.
+    subject.on_host = [](const std::uint32_t* words, const float*, double* values) {
+        const auto p = point_of<ClosurePoint>(words);
+        Library library;
+        library.tints = stability_tint;
+        const auto slab = Library::slab_of(p.slab);
+        const auto closure = library.prepare_closure(slab, p.view, p.footprint);
+        const auto value = library.evaluate_closure(closure, p.light);
+        const auto albedo = library.closure_albedo(closure);
+        const auto put = [&](int at, const glm::dvec3& v) { values[at] = v.x, values[at + 1] = v.y, values[at + 2] = v.z; };
+        put(0, value.specular);
+        put(3, value.diffuse + value.subsurface);
+        put(6, albedo.specular + albedo.fuzz);
+        put(9, albedo.diffuse + albedo.transmission);
+        put(12, library.closure_throughput(closure));
+        put(15, library.closure_transmittance(closure, std::max(p.light.z, 0.0f)));
+        values[18] = library.slab_coverage(slab, p.view.z);
+    };
     subject.lower_cosine = [](const std::uint32_t* words) {
         const auto p = point_of<ClosurePoint>(words);
         return static_cast<double>(std::min(p.view.z, std::abs(p.light.z)));
@@ -148,6 +166,8 @@ void set_depth(Random& random, Slab& slab, double low, double high) {
 
 }  // namespace
 
+glm::dvec3 stability_tint(std::uint32_t, glm::dvec2 at) { return {at.x, 1.0 - 0.5 * at.y, 0.5 + 0.5 * at.x * at.y}; }
+
 std::vector<StabilitySubject> closure_subjects() {
     std::vector<StabilitySubject> subjects;
     const auto add = [&](StabilitySubject subject) -> StabilitySubject& {
@@ -175,11 +195,13 @@ std::vector<StabilitySubject> closure_subjects() {
     {
         auto& s = add(closure_subject("ggx-lambert", "GGX over a Lambertian medium.", 0));
         s.shader.defines = "#define NACRE_DIFFUSE_MODEL 1\n";
+        s.on_host = {};
         add_samplings(s, {.f0 = glm::vec3(0.04f), .albedo = glm::vec3(0.5f)}, {0.3f});
     }
     {
         auto& s = add(closure_subject("ggx-disney", "GGX over renormalized Disney diffuse.", 0));
         s.shader.defines = "#define NACRE_DIFFUSE_MODEL 2\n";
+        s.on_host = {};
         add_samplings(s, {.f0 = glm::vec3(0.04f), .albedo = glm::vec3(0.5f)}, {0.3f});
     }
     {

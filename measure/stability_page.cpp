@@ -150,6 +150,8 @@ std::string to_json(const StabilityReport& report) {
                                 {"tolerance", c.tolerance},
                                 {"note", c.note},
                                 {"closed_form_error", finite(f.closed_error)},
+                                {"reference_error", finite(f.host_error)},
+                                {"reference_at", f.host_at},
                                 {"sample_agreement", finite(f.agreement)},
                                 {"facets", f.facets},
                                 {"chi2_tests", c.chi2_tests},

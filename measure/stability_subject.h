@@ -68,6 +68,10 @@ struct StabilitySubject {
     /// What formulae of other form give for the results, in double precision; NaN where there is none.
     std::function<void(const std::uint32_t* words, double* values)> closed_form;
 
+    /// What the same text gives for the results when it is compiled for the host; the rest is left as it is.
+    /// `parameters`: of the point's set.
+    std::function<void(const std::uint32_t* words, const float* parameters, double* values)> on_host;
+
     std::vector<FurnaceCase> furnaces;    ///< Of slabs.
     std::vector<SamplingCase> samplings;  ///< Of slabs.
     /// Smallest and largest energy under white light, where the subject is not a slab; the flag asks for fewer cases.
@@ -86,6 +90,9 @@ void put_point(const Point& point, std::uint32_t* words) {
     static_assert(sizeof point % 4 == 0);
     std::memcpy(words, static_cast<const void*>(&point), sizeof point);
 }
+
+/// What slab_specular_lut looks up in the sweep, on devices and on the host.
+[[nodiscard]] glm::dvec3 stability_tint(std::uint32_t index, glm::dvec2 at);
 
 /// All closures and lobes.
 [[nodiscard]] std::vector<StabilitySubject> closure_subjects();

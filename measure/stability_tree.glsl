@@ -22,10 +22,12 @@ void main() {
     put(at + 7u, state.top.coverage);
 #ifdef REFERENCE
     float scale = 1.0;
-    for (uint i = 0u; i < tree_closure_count; ++i) {
-        float weight = largest(state.paths[i].weight) * state.coverages[i];
-        if (weight > 0.0) scale += weight * lobe_scale(prepare_closure(state.slabs[i], view, footprint), light);
-    }
+    // CLOSURE_SCALES calls it for each closure: whole arrays would have to be kept for a loop.
+#define ADD_SCALE(i) \
+    if (largest(state.paths[i].weight) * state.coverages[i] > 0.0) \
+        scale += largest(state.paths[i].weight) * state.coverages[i] * \
+                 lobe_scale(prepare_closure(state.slabs[i], view, footprint), light);
+    CLOSURE_SCALES
     put(at + 8u, scale);
 #else
     put(at + 8u, 0.0);

@@ -117,7 +117,10 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
     std::string main;
     for (const EmbeddedFile& file : embedded_files())
         if (file.path == "measure/stability_tree.glsl") main = file.text;
+    std::string scales;
+    for (std::size_t i = 0; i < flat.topology.closures.size(); ++i) scales += fmt::format("ADD_SCALE({}) ", i);
     subject.shader = {.name = "tree",
+                      .defines = "#define CLOSURE_SCALES " + scales + "\n",
                       .text = fmt::format("vec3 specular_lut(uint index, vec2 at) {{ return vec3(1.0); }}\n"
                                           "float tree_parameter(uint index) {{ return parameters[gl_WorkGroupID.x * {}u + "
                                           "index]; }}\nvec4 tree_texture(uint index) {{ return vec4(1.0); }}\n{}\n{}",
@@ -161,6 +164,24 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
                 parameters.push_back(value);
             }
         }
+    };
+    subject.on_host = [=](const std::uint32_t* words, const float* parameters, double* values) {
+        const auto p = point_of<TreePoint>(words);
+        FlattenedTree changed = flat;
+        std::ranges::fill(changed.topology.thickness, -1.0f);
+        for (std::size_t i = 0; i < sources->size(); ++i) {
+            const ParameterSource& source = (*sources)[i];
+            Node& node = changed.visible_tree.nodes[source.node];
+            if (source.field == nullptr) node.amount = parameters[i];
+            else source.field->set(node.slab, source.channel, parameters[i]);
+        }
+        const ShadedTree shaded = shade(changed, p.view, p.footprint);
+        const glm::dvec3 value = reflected(shaded, p.light);
+        const glm::dvec3 through = Library().matter_throughput(shaded.whole);
+        for (int channel = 0; channel < 3; ++channel)
+            values[channel] = value[channel], values[3 + channel] = through[channel];
+        values[6] = shaded.whole.coverage;
+        values[7] = shaded.top.coverage;
     };
     return subject;
 }
