@@ -132,11 +132,10 @@ StabilityFigures judge(const StabilitySubject& subject, const Batch& batch) {
         }
         const int angle = decade_bin(subject.lower_cosine(words), -StabilityFigures::angle_bins, StabilityFigures::angle_bins);
         figures.error_by_angle[angle] = std::max(figures.error_by_angle[angle], largest);
-        // One of those that share a set of parameters.
-        if (subject.on_host && i % 64 == 17) {
+        if (subject.on_host && !subject.is_judged_by_host && i % 64 == 17) {
             std::ranges::fill(closed, std::numeric_limits<double>::quiet_NaN());
             const std::size_t set = subject.shader.parameter_words;
-            subject.on_host(words, set > 0 ? &batch.parameters[i / 64 * set] : nullptr, closed.data());
+            subject.on_host(words, 1, set > 0 ? &batch.parameters[i / 64 * set] : nullptr, closed.data());
             for (std::size_t k = 0; k < width; ++k) {
                 if (std::isnan(closed[k])) continue;
                 const double scale = subject.results[k] == ResultKind::lobe ? at_light : 1.0;
@@ -171,6 +170,32 @@ StabilityFigures judge(const StabilitySubject& subject, const Batch& batch) {
     return figures;
 }
 
+// Work on all cores: `function` gets the numbers below `count`.
+template <typename Function>
+void for_all(std::size_t count, const Function& function) {
+    std::atomic<std::size_t> next{0};
+    std::vector<std::jthread> threads;
+    for (unsigned t = 0; t < std::max(std::thread::hardware_concurrency(), 1u); ++t)
+        threads.emplace_back([&] {
+            for (std::size_t i = next++; i < count; i = next++) function(i);
+        });
+}
+
+void compute_reference(const StabilitySubject& subject, Batch& batch) {
+    const std::size_t width = subject.results.size();
+    batch.reference.resize(width * batch.count);
+    for_all((batch.count + 63) / 64, [&](std::size_t group) {
+        const auto first = static_cast<std::uint32_t>(64 * group);
+        const std::uint32_t count = std::min(64u, batch.count - first);
+        std::vector<double> values(width * count, 0.0);
+        const std::size_t set = subject.shader.parameter_words;
+        subject.on_host(&batch.points[std::size_t{first} * subject.shader.point_words], count,
+                        set > 0 ? &batch.parameters[group * set] : nullptr, values.data());
+        std::ranges::transform(values, &batch.reference[width * first],
+                               [](double value) { return static_cast<float>(value); });
+    });
+}
+
 PointShaderDesc variant(const StabilitySubject& subject, const char* define, bool has_candidates) {
     PointShaderDesc desc = subject.shader;
     desc.defines += fmt::format("#define {} 1\n", define);
@@ -185,7 +210,10 @@ Expected<StabilityFigures> sweep(rhi::Device& device, rhi::Device& reference, co
                                  std::uint64_t points, std::uint64_t seed) {
     const bool follows = std::ranges::find(subject.results, ResultKind::direction) != subject.results.end();
     NACRE_TRY(PointShader candidate_shader, PointShader::make(device, variant(subject, "CANDIDATE", false)));
-    NACRE_TRY(PointShader reference_shader, PointShader::make(reference, variant(subject, "REFERENCE", follows)));
+    PointShader reference_shader;
+    if (!subject.is_judged_by_host) {
+        NACRE_TRY(reference_shader, PointShader::make(reference, variant(subject, "REFERENCE", follows)));
+    }
     StabilityFigures figures;
     const auto make = [&](std::uint64_t number) {
         auto batch = std::make_unique<Batch>();
@@ -205,27 +233,21 @@ Expected<StabilityFigures> sweep(rhi::Device& device, rhi::Device& reference, co
         if (!is_end) {
             next = std::async(std::launch::async, make, number + 1);
             NACRE_CHECK(candidate_shader.run(batch->points, {}, batch->parameters, batch->count, batch->candidate));
-            NACRE_CHECK(reference_shader.run(batch->points, batch->candidate, batch->parameters, batch->count,
-                                             batch->reference));
+            if (!subject.is_judged_by_host) {
+                NACRE_CHECK(reference_shader.run(batch->points, batch->candidate, batch->parameters, batch->count,
+                                                 batch->reference));
+            }
         }
         if (judged.valid()) figures.add(judged.get());
         if (is_end) break;
         last = std::move(batch);
-        judged = std::async(std::launch::async, [&subject, &last] { return judge(subject, *last); });
+        judged = std::async(std::launch::async, [&subject, &last] {
+            if (subject.is_judged_by_host) compute_reference(subject, *last);
+            return judge(subject, *last);
+        });
     }
     figures.seconds = seconds_since(start);
     return figures;
-}
-
-// Work on all cores: `function` gets the numbers below `count`.
-template <typename Function>
-void for_all(std::size_t count, const Function& function) {
-    std::atomic<std::size_t> next{0};
-    std::vector<std::jthread> threads;
-    for (unsigned t = 0; t < std::max(std::thread::hardware_concurrency(), 1u); ++t)
-        threads.emplace_back([&] {
-            for (std::size_t i = next++; i < count; i = next++) function(i);
-        });
 }
 
 Expected<void> measure_furnaces(const StabilitySubject& subject, bool is_short, StabilityClosure& row) {
@@ -356,7 +378,7 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
     }
     const auto start = Clock::now();
     StabilityReport report{.desc = desc};
-    auto reference = instance.create_device({.backend = "cpu:double:lanes=4"});
+    auto reference = instance.create_device({.backend = "cpu:double"});
     if (!reference) return std::unexpected(reference.error());
     std::vector<std::unique_ptr<rhi::Device>> devices;
     for (const std::string& backend : desc.backends) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A tree at many points (measure/stability.h); before it stand the functions of materials/tree_shader.h. A workgroup
 // shares one set of parameters.
-#include "measure/stability_functions.glsl"
 
 void main() {
     place = gl_GlobalInvocationID.x * POINT_WORDS;
@@ -20,16 +19,5 @@ void main() {
     put3(at + 3u, matter_throughput(state.whole));
     put(at + 6u, state.whole.coverage);
     put(at + 7u, state.top.coverage);
-#ifdef REFERENCE
-    float scale = 1.0;
-    // CLOSURE_SCALES calls it for each closure: whole arrays would have to be kept for a loop.
-#define ADD_SCALE(i) \
-    if (largest(state.paths[i].weight) * state.coverages[i] > 0.0) \
-        scale += largest(state.paths[i].weight) * state.coverages[i] * \
-                 lobe_scale(prepare_closure(state.slabs[i], view, footprint), light);
-    CLOSURE_SCALES
-    put(at + 8u, scale);
-#else
     put(at + 8u, 0.0);
-#endif
 }

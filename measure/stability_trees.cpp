@@ -117,10 +117,7 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
     std::string main;
     for (const EmbeddedFile& file : embedded_files())
         if (file.path == "measure/stability_tree.glsl") main = file.text;
-    std::string scales;
-    for (std::size_t i = 0; i < flat.topology.closures.size(); ++i) scales += fmt::format("ADD_SCALE({}) ", i);
     subject.shader = {.name = "tree",
-                      .defines = "#define CLOSURE_SCALES " + scales + "\n",
                       .text = fmt::format("vec3 specular_lut(uint index, vec2 at) {{ return vec3(1.0); }}\n"
                                           "float tree_parameter(uint index) {{ return parameters[gl_WorkGroupID.x * {}u + "
                                           "index]; }}\nvec4 tree_texture(uint index) {{ return vec4(1.0); }}\n{}\n{}",
@@ -165,8 +162,9 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
             }
         }
     };
-    subject.on_host = [=](const std::uint32_t* words, const float* parameters, double* values) {
-        const auto p = point_of<TreePoint>(words);
+    subject.is_judged_by_host = true;
+    const std::size_t width = subject.results.size();
+    subject.on_host = [=](const std::uint32_t* words, std::uint32_t count, const float* parameters, double* values) {
         FlattenedTree changed = flat;
         std::ranges::fill(changed.topology.thickness, -1.0f);
         for (std::size_t i = 0; i < sources->size(); ++i) {
@@ -175,13 +173,28 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
             if (source.field == nullptr) node.amount = parameters[i];
             else source.field->set(node.slab, source.channel, parameters[i]);
         }
-        const ShadedTree shaded = shade(changed, p.view, p.footprint);
-        const glm::dvec3 value = reflected(shaded, p.light);
-        const glm::dvec3 through = Library().matter_throughput(shaded.whole);
-        for (int channel = 0; channel < 3; ++channel)
-            values[channel] = value[channel], values[3 + channel] = through[channel];
-        values[6] = shaded.whole.coverage;
-        values[7] = shaded.top.coverage;
+        Library library;
+        for (std::uint32_t i = 0; i < count; ++i, words += sizeof(TreePoint) / 4, values += width) {
+            const auto p = point_of<TreePoint>(words);
+            const ShadedTree shaded = shade(changed, p.view, p.footprint);
+            const glm::dvec3 value = reflected(shaded, p.light);
+            const glm::dvec3 through = library.matter_throughput(shaded.whole);
+            for (int channel = 0; channel < 3; ++channel)
+                values[channel] = value[channel], values[3 + channel] = through[channel];
+            values[6] = shaded.whole.coverage;
+            values[7] = shaded.top.coverage;
+            values[8] = 1.0;
+            for (const ShadedClosure& c : shaded.closures) {
+                const double weight = std::max({c.path.weight.x, c.path.weight.y, c.path.weight.z}) * c.coverage;
+                // What the lobes would send if they reflected everything: as lobe_scale() of stability_functions.glsl.
+                const glm::dvec3 h = library.half_vector(c.closure.view, p.light);
+                double scale = library.specular_lobe_pdf(c.closure.specular, c.closure.view, p.light, h);
+                if ((c.slab.features & slab_second_lobe) != 0)
+                    scale += library.specular_lobe_pdf(c.closure.second, c.closure.view, p.light, h);
+                if ((c.slab.features & slab_fuzz) != 0) scale += library.sheen_density(c.closure.fuzz_map, p.light);
+                values[8] += weight * scale;
+            }
+        }
     };
     return subject;
 }

@@ -7,13 +7,19 @@
 // that are measured (docs/materials.md). Roughness is perceptual; alpha is its square. Diffuse lobes include the cosine
 // of light.
 
+float disney_scatter(float f90, float cos_theta) {
+    float m = 1.0 - cos_theta;
+    return schlick_rest(cos_theta, m) + f90 * power5(m);
+}
+
 // Source: Burley 2012 and Lagarde and de Rousiers 2014, "Moving Frostbite to physically based rendering".
 float disney_diffuse(vec3 view, vec3 light, float roughness) {
     if (light.z <= 0.0) return 0.0;
     float half_cosine = half_vector_cosine(view, light);
-    float rise = 0.5 * roughness + 2.0 * half_cosine * half_cosine * roughness - 1.0;
-    float light_scatter = 1.0 + rise * power5(1.0 - min(light.z, 1.0));
-    float view_scatter = 1.0 + rise * power5(1.0 - min(view.z, 1.0));
+    // As published 1 + (f90 - 1) (1 - c)^5, which cancels along smooth surfaces.
+    float f90 = 0.5 * roughness + 2.0 * half_cosine * half_cosine * roughness;
+    float light_scatter = disney_scatter(f90, min(light.z, 1.0));
+    float view_scatter = disney_scatter(f90, min(view.z, 1.0));
     return light_scatter * view_scatter * mix(1.0, 1.0 / 1.51, roughness) * light.z / pi;
 }
 

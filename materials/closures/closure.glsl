@@ -294,7 +294,8 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 #ifdef NACRE_SLAB_MEDIUM
     sum += closure.transmission_probability;
 #endif
-    float scale = sum > 0.0 ? 1.0 / sum : 0.0;
+    // One over less would be infinite.
+    float scale = sum > 1e-30 ? 1.0 / sum : 0.0;
     closure.specular_probability *= scale;
     closure.diffuse_probability *= scale;
 #ifdef NACRE_SLAB_SECOND_LOBE

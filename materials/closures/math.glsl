@@ -13,6 +13,9 @@ float square(float x) { return x * x; }
 float power5(float x) { return square(square(x)) * x; }
 float power6(float x) { return square(square(x) * x); }
 
+// 1 - (1 - c)^5 by c and m = 1 - c, without the loss of digits near 0.
+float schlick_rest(float c, float m) { return c * (1.0 + m * (1.0 + m * (1.0 + m * (1.0 + m)))); }
+
 float largest(vec3 v) { return max(v.x, max(v.y, v.z)); }
 float saturated(float x) { return clamp(x, 0.0, 1.0); }
 
