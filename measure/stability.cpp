@@ -299,7 +299,8 @@ Expected<void> test_samplers(rhi::Device& device, const StabilitySubject& subjec
         Library library;
         library.tints = stability_tint;
         const auto closure = library.prepare_closure(Library::slab_of(test.slab), view, 1e-3f);
-        const double alpha = test.slab.roughness * test.slab.roughness;
+        const glm::dvec2 alphas = closure.specular.alpha;
+        const double alpha = std::min(alphas.x, alphas.y);
         tests[i].emplace(DirectionBins{.rings = is_short ? 40 : 80,
                                        .axis = {-view.x, -view.y, view.z},
                                        // Along the surface a lobe is as thin as the view is low.

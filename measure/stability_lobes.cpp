@@ -260,16 +260,25 @@ std::vector<StabilitySubject> lobe_subjects() {
         };
     }
     {
-        add(lobe_subject("lobe-film", "Reflectance of a thin film, and of the curve through it.",
+        auto& s = add(lobe_subject("lobe-film", "Reflectance of a thin film, and of the curve through it.",
                                    "#include \"materials/closures/thin_film.glsl\"", R"(
-    float thickness = p.roughness * 1e-6;
+    float thickness = p.distance;
     float ior = 1.0 + p.random.x;
-    put3(p.at, film_transmittance(p.color, thickness, ior, p.view.z));
+    FilmShares shares = film_shares(p.color, thickness, ior, p.view.z);
+    put3(p.at, shares.passed);
     Fresnel fresnel = make_film_fresnel(make_fresnel(p.color, vec3(1.0), vec3(1.0)), thickness, ior, p.view.z);
     put3(p.at + 3u, fresnel.normal);
     put3(p.at + 6u, fresnel_reflectance(fresnel, p.light.z));
-    put3(p.at + 9u, film_reflectance(p.color, thickness, ior, p.view.z));)",
-                                   std::vector<ResultKind>(12, share)));
+    put3(p.at + 9u, shares.reflected);)",
+                         std::vector<ResultKind>(12, share)));
+        // What a shader makes of a point must be the same in both precisions.
+        s.make_point = [](Random& random, std::uint32_t* words) {
+            make_lobe_point(random, words);
+            auto point = point_of<LobePoint>(words);
+            point.distance = point.roughness * 1e-6f;
+            point.random.x = std::round(point.random.x * 1024.0f) / 1024.0f;
+            put_point(point, words);
+        };
     }
     {
         auto& s = add(lobe_subject("lobe-fuzz", "The fibers' map: density, sample and albedo.",
@@ -324,7 +333,7 @@ std::vector<StabilitySubject> lobe_subjects() {
     put(p.at + 2u, medium_albedo(medium_similarity(p.color.y)));
     put(p.at + 3u, medium_similarity(p.color.y));
     put(p.at + 4u, medium_dissimilarity(p.color.y));
-    put(p.at + 5u, scattering_albedo(medium_similarity(p.color.y), 0.99 * p.anisotropy));)",
+    put(p.at + 5u, scattering_albedo(medium_dissimilarity(p.color.y), 0.99 * p.anisotropy));)",
                                    std::vector<ResultKind>(6, share)));
         s.shader.features = materials::slab_medium;
         s.shader.has_tables = true;
@@ -342,7 +351,8 @@ std::vector<StabilitySubject> lobe_subjects() {
     Haze haze = make_haze(p.color.x, p.roughness, p.color.y, 10.0 * p.color.z);
     put(p.at, haze.f0);
     put(p.at + 1u, haze.second_roughness);
-    put(p.at + 2u, haze.second_weight);)",
+    // What the second lobe reflects: its share of nothing does not matter.
+    put(p.at + 2u, haze.f0 * haze.second_weight);)",
                                    std::vector<ResultKind>(3, share)));
     }
     {
@@ -373,7 +383,7 @@ std::vector<StabilitySubject> lobe_subjects() {
     put3(p.at + 9u, both.view_transmittance);
     put3(p.at + 12u, beside.albedo);
     put3(p.at + 15u, path.weight);
-    put3(p.at + 18u, top_transmittance(path, p.light.z));
+    put3(p.at + 18u, path.weight * top_transmittance(path, p.light.z));
     put(p.at + 21u, both.coverage);
     put(p.at + 22u, tracked_roughness(p.roughness, variance_below(0.0, slab_spread(slab, p.view.z))));)",
                                    std::vector<ResultKind>(23, share)));
@@ -417,13 +427,13 @@ std::vector<StabilitySubject> lobe_subjects() {
                 },
                 0.35);
     add_classic("classic-ashikhmin", "Ashikhmin's distribution with Neubelt's visibility.", R"(
-    float distribution = ashikhmin_distribution(half_vector(p.view, p.light).z, max(p.roughness * p.roughness, 1e-3));
+    float distribution = ashikhmin_distribution(half_vector(p.view, p.light), max(p.roughness * p.roughness, 1e-3));
     float value = distribution * neubelt_visibility(p.view.z, p.light.z) * p.light.z;
     put(p.at, value);
     put(p.at + 1u, defect(neubelt_visibility(p.view.z, p.light.z), neubelt_visibility(p.light.z, p.view.z), 1.0));)",
                 [](const Direction& view, const Direction& light, double roughness) {
                     Library library;
-                    return library.ashikhmin_distribution(library.half_vector(view, light).z,
+                    return library.ashikhmin_distribution(library.half_vector(view, light),
                                                           std::max(roughness * roughness, 1e-3)) *
                            library.neubelt_visibility(view.z, light.z) * light.z;
                 },
@@ -433,17 +443,17 @@ std::vector<StabilitySubject> lobe_subjects() {
                     is_softened ? "Charlie with its own visibility and softened terminator."
                                 : "Charlie with its own visibility.",
                     is_softened ? R"(
-    float distribution = charlie_distribution(half_vector(p.view, p.light).z, p.roughness);
+    float distribution = charlie_distribution(half_vector(p.view, p.light), p.roughness);
     put(p.at, distribution * charlie_visibility(p.view.z, p.light.z, p.roughness, true) * p.light.z);
     put(p.at + 1u, 0.0);)"
                                 : R"(
-    float distribution = charlie_distribution(half_vector(p.view, p.light).z, p.roughness);
+    float distribution = charlie_distribution(half_vector(p.view, p.light), p.roughness);
     put(p.at, distribution * charlie_visibility(p.view.z, p.light.z, p.roughness, false) * p.light.z);
     put(p.at + 1u, defect(charlie_visibility(p.view.z, p.light.z, p.roughness, false),
                           charlie_visibility(p.light.z, p.view.z, p.roughness, false), 1.0));)",
                     [is_softened](const Direction& view, const Direction& light, double roughness) {
                         Library library;
-                        return library.charlie_distribution(library.half_vector(view, light).z, roughness) *
+                        return library.charlie_distribution(library.half_vector(view, light), roughness) *
                                library.charlie_visibility(view.z, light.z, roughness, is_softened) * light.z;
                     },
                     0.1);

@@ -40,22 +40,23 @@ float neubelt_visibility(float view_cosine, float light_cosine) {
     return 1.0 / max(4.0 * (light_cosine + view_cosine - light_cosine * view_cosine), 1e-7);
 }
 
-// Distributions of fibers that stand on a surface, by the cosine of the half vector to the normal; 1 / pi included.
+// Distributions of fibers that stand on a surface, by the half vector; 1 / pi included. Its tangential part has the
+// digits that 1 - cos^2 loses.
 
 // Source: Ashikhmin and Premoze 2007, "Distribution-based BRDFs".
-float ashikhmin_distribution(float normal_half, float alpha) {
+float ashikhmin_distribution(vec3 h, float alpha) {
     float a2 = max(alpha * alpha, 1e-8);
-    float cos2 = normal_half * normal_half;
-    float sin2 = max(1.0 - cos2, 1e-6);
+    float cos2 = h.z * h.z;
+    float sin2 = max(h.x * h.x + h.y * h.y, 1e-6);
     float sin4 = sin2 * sin2;
     return (4.0 * exp(-cos2 / (sin2 * a2)) + sin4) / (pi * (1.0 + 4.0 * a2) * sin4);
 }
 
 // Source: Estevez and Kulla 2017, "Production friendly microfacet sheen BRDF". Below a roughness of 0.1 it reflects
 // more than it gets with most visibilities.
-float charlie_distribution(float normal_half, float roughness) {
+float charlie_distribution(vec3 h, float roughness) {
     float exponent = 1.0 / clamp(roughness, 0.01, 1.0);
-    float sin2 = clamp(1.0 - normal_half * normal_half, 1e-9, 1.0);
+    float sin2 = clamp(h.x * h.x + h.y * h.y, 1e-9, 1.0);
     return (2.0 + exponent) * pow(sin2, 0.5 * exponent) / (2.0 * pi);
 }
 

@@ -484,8 +484,9 @@ vec3 closure_throughput(Closure closure) {
 // Coverage of a slab seen from a cosine to its normal.
 float slab_coverage(Slab slab, float cos_theta) {
     if ((slab.features & slab_edge_coverage) == 0u) return slab.coverage;
-    float m = 1.0 - saturated(cos_theta);
-    return mix(slab.coverage, slab.edge_coverage, m > 0.0 ? pow(m, slab.edge_exponent) : 0.0);
+    // (1 - c)^exponent and what is left of 1: near the surface that is small, and may be all there is.
+    float steps = slab.edge_exponent * minus_log_rest(saturated(cos_theta));
+    return slab.coverage * exponential_rest(steps) + slab.edge_coverage * exp(-steps);
 }
 #endif
 
