@@ -205,51 +205,6 @@ PointShaderDesc variant(const StabilitySubject& subject, const char* define, boo
     return desc;
 }
 
-// Runs the points of one subject on one device. The next batch is made, and the last one judged, while devices work.
-Expected<StabilityFigures> sweep(rhi::Device& device, rhi::Device& reference, const StabilitySubject& subject,
-                                 std::uint64_t points, std::uint64_t seed) {
-    const bool follows = std::ranges::find(subject.results, ResultKind::direction) != subject.results.end();
-    NACRE_TRY(PointShader candidate_shader, PointShader::make(device, variant(subject, "CANDIDATE", false)));
-    PointShader reference_shader;
-    if (!subject.is_judged_by_host) {
-        NACRE_TRY(reference_shader, PointShader::make(reference, variant(subject, "REFERENCE", follows)));
-    }
-    StabilityFigures figures;
-    const auto make = [&](std::uint64_t number) {
-        auto batch = std::make_unique<Batch>();
-        batch->seed = seed + 0x9e3779b97f4a7c15ull * (number + 1);
-        batch->count = static_cast<std::uint32_t>(
-            std::min<std::uint64_t>(batch_points, points - std::min(points, number * batch_points)));
-        if (batch->count > 0) fill(subject, *batch);
-        return batch;
-    };
-    const auto start = Clock::now();
-    std::unique_ptr<Batch> last;  // outlives who reads it
-    std::future<std::unique_ptr<Batch>> next = std::async(std::launch::async, make, 0);
-    std::future<StabilityFigures> judged;
-    for (std::uint64_t number = 0;; ++number) {
-        std::unique_ptr<Batch> batch = next.get();
-        const bool is_end = batch->count == 0;
-        if (!is_end) {
-            next = std::async(std::launch::async, make, number + 1);
-            NACRE_CHECK(candidate_shader.run(batch->points, {}, batch->parameters, batch->count, batch->candidate));
-            if (!subject.is_judged_by_host) {
-                NACRE_CHECK(reference_shader.run(batch->points, batch->candidate, batch->parameters, batch->count,
-                                                 batch->reference));
-            }
-        }
-        if (judged.valid()) figures.add(judged.get());
-        if (is_end) break;
-        last = std::move(batch);
-        judged = std::async(std::launch::async, [&subject, &last] {
-            if (subject.is_judged_by_host) compute_reference(subject, *last);
-            return judge(subject, *last);
-        });
-    }
-    figures.seconds = seconds_since(start);
-    return figures;
-}
-
 Expected<void> measure_furnaces(const StabilitySubject& subject, bool is_short, StabilityClosure& row) {
     if (subject.furnace) {
         NACRE_TRY(const auto range, subject.furnace(is_short));
@@ -270,7 +225,7 @@ Expected<void> measure_furnaces(const StabilitySubject& subject, bool is_short, 
         library.tints = stability_tint;
         const auto closure = library.prepare_closure(Library::slab_of(furnace.slab),
                                                      direction(furnace.cosine, furnace.azimuth), 1e-3);
-        const glm::dvec3 energy = integrate(library, closure, is_short ? 40 : 96) + library.closure_throughput(closure);
+        const glm::dvec3 energy = integrate(library, closure, is_short ? 64 : 96) + library.closure_throughput(closure);
         const std::scoped_lock lock(mutex);
         row.furnace_max = std::max({row.furnace_max, energy.x, energy.y, energy.z});
         if (furnace.is_lossless || !row.has_lossless)
@@ -372,6 +327,51 @@ std::uint64_t stability_samples(std::uint64_t points) {
     return std::clamp<std::uint64_t>(points / 25, 100'000, 4'000'000);
 }
 
+// The next batch is made, and the last one judged, while devices work.
+Expected<StabilityFigures> measure_subject(rhi::Device& device, rhi::Device& reference, const StabilitySubject& subject,
+                                 std::uint64_t points, std::uint64_t seed) {
+    const bool follows = std::ranges::find(subject.results, ResultKind::direction) != subject.results.end();
+    NACRE_TRY(PointShader candidate_shader, PointShader::make(device, variant(subject, "CANDIDATE", false)));
+    PointShader reference_shader;
+    if (!subject.is_judged_by_host) {
+        NACRE_TRY(reference_shader, PointShader::make(reference, variant(subject, "REFERENCE", follows)));
+    }
+    StabilityFigures figures;
+    const auto make = [&](std::uint64_t number) {
+        auto batch = std::make_unique<Batch>();
+        batch->seed = seed + 0x9e3779b97f4a7c15ull * (number + 1);
+        batch->count = static_cast<std::uint32_t>(
+            std::min<std::uint64_t>(batch_points, points - std::min(points, number * batch_points)));
+        if (batch->count > 0) fill(subject, *batch);
+        return batch;
+    };
+    const auto start = Clock::now();
+    std::unique_ptr<Batch> last;  // outlives who reads it
+    std::future<std::unique_ptr<Batch>> next = std::async(std::launch::async, make, 0);
+    std::future<StabilityFigures> judged;
+    for (std::uint64_t number = 0;; ++number) {
+        std::unique_ptr<Batch> batch = next.get();
+        const bool is_end = batch->count == 0;
+        if (!is_end) {
+            next = std::async(std::launch::async, make, number + 1);
+            NACRE_CHECK(candidate_shader.run(batch->points, {}, batch->parameters, batch->count, batch->candidate));
+            if (!subject.is_judged_by_host) {
+                NACRE_CHECK(reference_shader.run(batch->points, batch->candidate, batch->parameters, batch->count,
+                                                 batch->reference));
+            }
+        }
+        if (judged.valid()) figures.add(judged.get());
+        if (is_end) break;
+        last = std::move(batch);
+        judged = std::async(std::launch::async, [&subject, &last] {
+            if (subject.is_judged_by_host) compute_reference(subject, *last);
+            return judge(subject, *last);
+        });
+    }
+    figures.seconds = seconds_since(start);
+    return figures;
+}
+
 Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const StabilityDesc& desc) {
     if (desc.points < 1000) {
         return fail(ErrorCode::invalid_argument, "measure stability", fmt::format("{} points", desc.points),
@@ -396,7 +396,7 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
     std::erase_if(subjects, [&](const StabilitySubject& s) { return s.name.find(desc.only) == std::string::npos; });
     if (subjects.empty()) {
         return fail(ErrorCode::not_found, "measure stability", fmt::format("'{}'", desc.only),
-                    "no closure's name contains it");
+                    "no closure's name contains it", "Leave --only out to see all names.");
     }
     double shares = 0.0;
     std::size_t tests = 0;
@@ -424,7 +424,7 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
             // At least one batch: what is smaller costs no less.
             const auto points = static_cast<std::uint64_t>(
                 std::ceil(static_cast<double>(d == 0 ? desc.points : desc.points / 10) * subject.share / shares));
-            NACRE_TRY(const StabilityFigures figures, sweep(*devices[d], **reference, subject, points, 1000 * s + d));
+            NACRE_TRY(const StabilityFigures figures, measure_subject(*devices[d], **reference, subject, points, 1000 * s + d));
             row->devices[d].add(figures);
             row->all.add(figures);
         }

@@ -16,6 +16,9 @@ namespace {
 
 using namespace materials;
 
+constexpr const char* deep_medium_note =
+    "What comes through a deep medium is what a table of 16 bits leaves to 1: where that is some of its steps, few digits "
+    "of single precision are behind it.";
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 /// What the shader reads for one point, in this order; only 32-bit words.
@@ -271,9 +274,11 @@ std::vector<StabilitySubject> closure_subjects() {
         auto& s = add(closure_subject("glints", "A lobe of counted facets.", slab_glints,
                                       [](Random&, Slab& slab) { slab.albedo = glm::vec3(0.0f); }));
         s.counts_facets = true;
+        s.tolerance = 1e-2;
         s.note =
-            "A count of facets may fall to the other side of a whole number; these points are counted, not judged. The "
-            "sampler draws from the smooth lobe: its weights carry the count.";
+            "A place between two cells of surface or slopes is what is left of a number of up to millions by its whole "
+            "part: that costs digits. A count of facets may fall to the other side of a whole number; these points are "
+            "counted, not judged. The sampler draws from the smooth lobe: its weights carry the count.";
         add_furnaces(s, {.f0 = glm::vec3(1.0f), .albedo = glm::vec3(0.0f), .glint_density = 1e30f}, true);
         add_samplings(s, {.f0 = glm::vec3(0.8f), .albedo = glm::vec3(0.0f), .glint_density = 1e6f}, {0.3f});
     }
@@ -295,7 +300,7 @@ std::vector<StabilitySubject> closure_subjects() {
             if (is_empty && random() < 0.1) slab.thickness = random() < 0.5 ? 0.0f : 1e-40f;
             if (regime.low > 0.0 && regime.low < 1.0 && random() < 0.3) slab.thickness = infinity;
         }));
-        s.shader.features = slab_medium;
+        if (regime.high > 3.0) s.tolerance = 1e-2, s.note = deep_medium_note;
         for (const double depth : {regime.low, 0.5 * (regime.low + regime.high), regime.high}) {
             for (const float phase : {0.0f, 0.8f, -0.8f}) {
                 Slab slab{.f0 = glm::vec3(0.04f), .phase_anisotropy = phase, .thickness = 1e-3f};
@@ -338,6 +343,8 @@ std::vector<StabilitySubject> closure_subjects() {
             s.furnaces.push_back(furnace);
         }
         s.share = 4.0;
+        s.tolerance = 1e-2;
+        s.note = deep_medium_note;
     }
     for (StabilitySubject& subject : subjects) subject.shader.name = subject.name;
     return subjects;

@@ -264,12 +264,16 @@ std::vector<StabilitySubject> lobe_subjects() {
                                    "#include \"materials/closures/thin_film.glsl\"", R"(
     float thickness = p.distance;
     float ior = 1.0 + p.random.x;
-    FilmShares shares = film_shares(p.color, thickness, ior, p.view.z);
+    // The cosines that the curve through it asks for.
+    float c = max(p.view.z, 0.1);
+    FilmShares shares = film_shares(p.color, thickness, ior, c);
     put3(p.at, shares.passed);
-    Fresnel fresnel = make_film_fresnel(make_fresnel(p.color, vec3(1.0), vec3(1.0)), thickness, ior, p.view.z);
+    Fresnel fresnel = make_film_fresnel(make_fresnel(p.color, vec3(1.0), vec3(1.0)), thickness, ior, c);
     put3(p.at + 3u, fresnel.normal);
     put3(p.at + 6u, fresnel_reflectance(fresnel, p.light.z));
-    put3(p.at + 9u, shares.reflected);)",
+    put3(p.at + 9u, vec3(shares.passed.x < 0.5 ? 1.0 - shares.passed.x : shares.reflected.x,
+                         shares.passed.y < 0.5 ? 1.0 - shares.passed.y : shares.reflected.y,
+                         shares.passed.z < 0.5 ? 1.0 - shares.passed.z : shares.reflected.z));)",
                          std::vector<ResultKind>(12, share)));
         // What a shader makes of a point must be the same in both precisions.
         s.make_point = [](Random& random, std::uint32_t* words) {
@@ -354,42 +358,6 @@ std::vector<StabilitySubject> lobe_subjects() {
     // What the second lobe reflects: its share of nothing does not matter.
     put(p.at + 2u, haze.f0 * haze.second_weight);)",
                                    std::vector<ResultKind>(3, share)));
-    }
-    {
-        auto& s = add(lobe_subject("operators", "What trees are made of: spread, matter, paths through layers.",
-                                   "vec3 specular_lut(uint index, vec2 at) { return vec3(1.0); }\n"
-                                   "#include \"materials/closures/operators.glsl\"",
-                                   R"(
-    Slab slab;
-    slab.features = slab_medium;
-    slab.coverage = p.random.x;
-    slab.f0 = p.color;
-    slab.roughness = p.roughness;
-    slab.albedo = vec3(p.random.y, 1.0, p.color.x);
-    slab.mean_free_path = vec3(p.mean_free_path);
-    slab.thickness = p.distance;
-    slab.phase_anisotropy = 0.99 * p.anisotropy;
-    Matter top = slab_matter(slab, prepare_closure(slab, p.view, 1e-3));
-    Slab base = slab;
-    base.features = 0u;
-    base.coverage = p.random.y;
-    Matter below = base_matter(base, p.view.z);
-    Matter both = layer_matter(top, below);
-    Matter beside = mix_matter(top, below, abs(p.anisotropy));
-    Path path = path_through_layer(open_path(), top, below.albedo);
-    put3(p.at, both.albedo);
-    put3(p.at + 3u, both.internal);
-    put3(p.at + 6u, both.passed);
-    put3(p.at + 9u, both.view_transmittance);
-    put3(p.at + 12u, beside.albedo);
-    put3(p.at + 15u, path.weight);
-    put3(p.at + 18u, path.weight * top_transmittance(path, p.light.z));
-    put(p.at + 21u, both.coverage);
-    put(p.at + 22u, tracked_roughness(p.roughness, variance_below(0.0, slab_spread(slab, p.view.z))));)",
-                                   std::vector<ResultKind>(23, share)));
-        s.shader.features = materials::slab_medium;
-        s.shader.has_tables = true;
-        s.share = 1.0;
     }
     const auto add_classic = [&](const char* name, const char* what, const char* body,
                                  const auto& lobe, double smoothest) -> StabilitySubject& {

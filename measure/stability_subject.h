@@ -11,6 +11,7 @@
 #include "materials/slab.h"
 #include "measure/closure_points.h"
 #include "measure/point_shader.h"
+#include "measure/stability.h"
 
 /// @file
 /// What the stability sweep (measure/stability.h) runs: closures, single lobes and trees, as shaders with points.
@@ -92,6 +93,11 @@ void put_point(const Point& point, std::uint32_t* words) {
     static_assert(sizeof point % 4 == 0);
     std::memcpy(words, static_cast<const void*>(&point), sizeof point);
 }
+
+/// Runs `points` of a subject on `device`, and on `reference` (in double precision) what it is judged by. Errors: those
+/// of shaders and buffers.
+Expected<StabilityFigures> measure_subject(rhi::Device& device, rhi::Device& reference, const StabilitySubject& subject,
+                                           std::uint64_t points, std::uint64_t seed);
 
 /// What slab_specular_lut looks up in the sweep, on devices and on the host.
 [[nodiscard]] glm::dvec3 stability_tint(std::uint32_t index, glm::dvec2 at);

@@ -486,7 +486,10 @@ float slab_coverage(Slab slab, float cos_theta) {
     if ((slab.features & slab_edge_coverage) == 0u) return slab.coverage;
     // (1 - c)^exponent and what is left of 1: near the surface that is small, and may be all there is.
     float steps = slab.edge_exponent * minus_log_rest(saturated(cos_theta));
-    return slab.coverage * exponential_rest(steps) + slab.edge_coverage * exp(-steps);
+    float rest = exponential_rest(steps);
+    // Both make 1: a coverage above 1 would leave less than nothing beside it.
+    float left = steps < 0.01 ? 1.0 - rest : exp(-steps);
+    return min(slab.coverage * rest + slab.edge_coverage * left, 1.0);
 }
 #endif
 

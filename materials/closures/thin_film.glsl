@@ -39,7 +39,8 @@ float film_passed(float outer, float through, float inner, float inner_rest, flo
     return passed * (1.0 + 2.0 * amplitude * (first_order + amplitude * second_order));
 }
 
-// The same for the reflectance: what cancels are numbers of its own size, where neither side reflects much.
+// The same for the reflectance: what cancels are numbers of its own size, where neither side reflects much. (Where
+// both reflect nearly everything its digits are lost.)
 float film_reflected(float outer, float through, float inner, float inner_rest, float first_order,
                      float second_order) {
     float amplitude = sqrt(outer * inner);

@@ -34,7 +34,13 @@ Outcome run(const StabilityArguments& arguments) {
             if (std::ranges::find(working, name) != working.end()) desc.backends.emplace_back(name);
         }
     }
-    NACRE_TRY(const measure::StabilityReport report, measure::measure_stability(*instance, desc));
+    auto measured = measure::measure_stability(*instance, desc);
+    if (!measured) {
+        const ErrorCode code = measured.error().code;
+        if (code == ErrorCode::not_found || code == ErrorCode::invalid_argument) return wrong_usage(measured.error());
+        return std::unexpected(Failure(measured.error()));
+    }
+    const measure::StabilityReport& report = *measured;
     const std::string json = measure::to_json(report);
 
     TextTable table({"closure", "points", "NaN", "inf", "negative", "max error", "furnace", "reciprocity", "chi-square",
