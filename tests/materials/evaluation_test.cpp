@@ -8,12 +8,10 @@
 #include <limits>
 #include <random>
 
-#include "measure/random_tree.h"
+#include "tests/materials/random_tree.h"
 
 namespace nacre::materials {
 namespace {
-
-using measure::random_tree;
 
 constexpr double cosines[] = {1.0, 0.8, 0.5, 0.2, 0.05, 0.005};
 constexpr std::uint32_t lobes = slab_anisotropy | slab_second_lobe | slab_fuzz | slab_f90 | slab_f82;
