@@ -111,7 +111,7 @@ Value Emitter::parameter_value(const Instruction& parameter, std::span<llvm::Val
         auto& variable = lane_variables[parameter.result];
         variable = std::make_unique<LaneVariable>();
         variable->type = type.element;
-        variable->slot_bytes = module.type(type.element).has_wide ? 8 : 4;
+        variable->slot_bytes = slot_bytes_of(module.type(type.element));
         variable->memory = values[0];
         pointer->kind = Pointer::Kind::lanes;
         pointer->variable = variable.get(), pointer->variable_id = parameter.result;

@@ -35,7 +35,7 @@ LaneVariable& Emitter::make_lane_variable(Id variable_id, Id type_id, bool is_un
             hold_constant(*made, content);
             return *made;
         }
-        made->slot_bytes = type.has_wide || in_double() ? 8 : 4;
+        made->slot_bytes = slot_bytes_of(type);
         const std::uint64_t bytes = std::uint64_t{type.components} * made->slot_bytes * (is_uniform ? 1 : lanes);
         if (bytes > (1u << 24))
             reject(fmt::format("a variable of {} scalars takes {} bytes for {} lanes; 16 MiB is the most", type.components, bytes, lanes));
@@ -63,7 +63,7 @@ LaneVariable& Emitter::make_lane_variable(Id variable_id, Id type_id, bool is_un
 void Emitter::hold_constant(LaneVariable& variable, Id content) {
     const Value value = constant(content);
     variable.is_uniform = true;
-    variable.slot_bytes = module.type(variable.type).has_wide || in_double() ? 8 : 4;
+    variable.slot_bytes = slot_bytes_of(module.type(variable.type));
     std::vector<std::uint32_t> words;
     words.reserve(value.components.size() * variable.slot_bytes / 4);
     for (const Component& component : value.components) {
@@ -497,7 +497,7 @@ Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t ind
         // Inputs that are indexed dynamically get memory, once, where all of the function can see it.
         LaneVariable spilled;
         const Type& type = module.type(variable.type);
-        spilled.slot_bytes = type.has_wide || in_double() ? 8 : 4;
+        spilled.slot_bytes = slot_bytes_of(type);
         spilled.memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * spilled.slot_bytes * lanes), "input");
         fill(spilled, variable.components);
         Pointer through = pointer;

@@ -159,6 +159,8 @@ class Emitter {
     [[nodiscard]] bool in_double() const { return options.mode == ExecutionMode::double_precision; }
     /// What a float of 32 bits is in registers.
     [[nodiscard]] llvm::Type* real_type() { return in_double() ? builder.getDoubleTy() : builder.getFloatTy(); }
+    /// LaneVariable::slot_bytes of variables of a type: room for its widest scalar as registers hold it.
+    [[nodiscard]] std::uint32_t slot_bytes_of(const Type& type) const { return type.has_wide || in_double() ? 8 : 4; }
     /// Floats as single precision whatever they are in registers, and back.
     Component to_single(const Component& value);
     Component from_single(const Component& value);
