@@ -108,7 +108,7 @@ class OrcGenerator final : public CodeGenerator {
         module.setDataLayout(layout_);
     }
 
-    Expected<std::vector<std::byte>> compile(llvm::Module& module, const std::string& name, bool has_coroutines) override {
+    Expected<Object> compile(llvm::Module& module, const std::string& name, bool has_coroutines) override {
         bool is_huge = module.getInstructionCount() > most_instructions;
         auto machine = make_machine(is_huge ? llvm::CodeGenOptLevel::None : llvm::CodeGenOptLevel::Less);
         if (!machine) return std::unexpected(failed(name, "no target machine"));
@@ -151,13 +151,8 @@ class OrcGenerator final : public CodeGenerator {
             return std::unexpected(failed(name, "the target writes no object files"));
         passes.run(module);
         if (told.has_error) return std::unexpected(failed(name, "LLVM cannot translate the code"));
-        // Nothing is on the stack twice, since nothing calls itself.
-        if (told.stack_bytes > most_stack_bytes)
-            return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", name),
-                        fmt::format("its values take {} bytes of stack; {} are the most", told.stack_bytes, most_stack_bytes),
-                        "Load parts of arrays and structures instead of whole ones.");
         const auto* first = reinterpret_cast<const std::byte*>(bytes.data());
-        return std::vector<std::byte>(first, first + bytes.size());
+        return Object{{first, first + bytes.size()}, told.stack_bytes};
     }
 
     Expected<std::shared_ptr<LoadedCode>> load(std::vector<std::byte> object, const std::string& name) override {
@@ -179,8 +174,6 @@ class OrcGenerator final : public CodeGenerator {
     static constexpr unsigned most_instructions = 150'000;
     /// And of one block.
     static constexpr std::size_t most_in_block = 10'000;
-    /// Of all functions together. Threads of schedulers have 4 MiB of stack.
-    static constexpr std::uint64_t most_stack_bytes = 3 << 20;
 
     static std::size_t largest_block(const llvm::Module& module) {
         std::size_t largest = 0;

@@ -31,8 +31,13 @@ class CodeGenerator {
 
     /// Gives a new module the data layout and target of this machine.
     virtual void prepare(llvm::Module& module) = 0;
-    /// Optimizes and translates. The bytes are an object file for `load`.
-    virtual Expected<std::vector<std::byte>> compile(llvm::Module& module, const std::string& name, bool has_coroutines) = 0;
+    /// What became of a module.
+    struct Object {
+        std::vector<std::byte> bytes;   ///< An object file for `load`.
+        std::uint64_t stack_bytes = 0;  ///< Of the frames of all its functions. Nothing calls itself, so it is the most.
+    };
+    /// Optimizes and translates.
+    virtual Expected<Object> compile(llvm::Module& module, const std::string& name, bool has_coroutines) = 0;
     /// Puts an object file that `compile` made, in this run or an earlier one on an equal machine, into memory.
     virtual Expected<std::shared_ptr<LoadedCode>> load(std::vector<std::byte> object, const std::string& name) = 0;
     /// Whatever the translation depends on besides the module: processor, features, versions.

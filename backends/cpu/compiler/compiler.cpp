@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <map>
+#include <mutex>
 
 #include "backends/cpu/compiler/code.h"
 #include "backends/cpu/compiler/legalization.h"
@@ -31,36 +32,19 @@ class ShaderCompilation final : public Compiler {
     ShaderCompilation(Variant all, Variant subgroups) : all_(std::move(all)), subgroups_(std::move(subgroups)) {}
 
     Expected<ComputeProgram> compile_compute(const ShaderSource& source) override {
-        ComputeProgram program;
-        program.name = std::string(source.name);
-        std::uint64_t workgroup_bytes = 0;
-        std::uint32_t subgroups = 1;
-        bool has_barriers = false;
-        const Variant& how = source.reflection && source.reflection->uses_subgroups && subgroups_.generator ? subgroups_ : all_;
-        std::vector<NarrowedOperation> narrowed;
-        NACRE_TRY(program.code, compile(how, source, spv::ExecutionModel::GLCompute, {}, narrowed,
-                                        [&](llvm::Module& target, const Module& module) {
-                                            ComputeEmitter emitter(target, module, how.options, source.slots);
-                                            emitter.trace_table = source.trace;
-                                            emitter.emit();
-                                            program.workgroup_size = module.workgroup_size;
-                                            workgroup_bytes = emitter.workgroup_bytes, subgroups = emitter.subgroups;
-                                            has_barriers = emitter.has_barriers;
-                                            return Emitted{has_barriers, emitter.narrowed()};
-                                        }));
-        program.narrowed = std::move(narrowed);
-        auto& code = static_cast<LoadedCode&>(*program.code);
-        program.run = reinterpret_cast<ComputeFunction>(code.find("kernel"));
-        if (!program.run) return missing(source);
-        program.workgroup_bytes = (workgroup_bytes + 63) / 64 * 64;
-        if (has_barriers) {
-            const auto frame_size = reinterpret_cast<void (*)(std::uint64_t*)>(code.find("frame_size"));
-            if (!frame_size) return missing(source);
-            std::uint64_t bytes = 0;
-            frame_size(&bytes);
-            program.workgroup_bytes += (bytes + 63) / 64 * 64 * subgroups;
-        }
-        return program;
+        const bool sees_lanes = source.reflection == nullptr || source.reflection->uses_subgroups;
+        const Variant& how = source.reflection && sees_lanes && subgroups_.generator ? subgroups_ : all_;
+        std::uint64_t stack_bytes = 0;
+        Expected<ComputeProgram> program = compile_compute(how, source, stack_bytes);
+        if (program || sees_lanes) return program;
+        // What is too large for the stack may fit with fewer lanes, and the shader cannot tell.
+        std::uint32_t lanes = how.options.lanes;
+        const auto fits = [&] { return stack_bytes * lanes <= most_stack_bytes * how.options.lanes; };
+        while (lanes > min_lanes && !fits()) lanes /= 2;
+        if (lanes == how.options.lanes || !fits()) return program;
+        NACRE_TRY(const Variant* narrower, with_lanes(lanes));
+        Expected<ComputeProgram> again = compile_compute(*narrower, source, stack_bytes);
+        return again ? std::move(again) : std::move(program);
     }
 
     Expected<VertexProgram> compile_vertex(const ShaderSource& source, const VertexInput& input) override {
@@ -105,6 +89,55 @@ class ShaderCompilation final : public Compiler {
     }
 
   private:
+    static constexpr std::uint32_t min_lanes = 4;
+    /// Of all functions of a program together. Threads of schedulers have 4 MiB of stack.
+    static constexpr std::uint64_t most_stack_bytes = 3 << 20;
+
+    /// @param stack_bytes  what the code takes, where that is too much
+    Expected<ComputeProgram> compile_compute(const Variant& how, const ShaderSource& source, std::uint64_t& stack_bytes) {
+        ComputeProgram program;
+        program.name = std::string(source.name);
+        std::uint64_t workgroup_bytes = 0;
+        std::uint32_t subgroups = 1;
+        bool has_barriers = false;
+        std::vector<NarrowedOperation> narrowed;
+        NACRE_TRY(program.code, compile(how, source, spv::ExecutionModel::GLCompute, {}, narrowed,
+                                        [&](llvm::Module& target, const Module& module) {
+                                            ComputeEmitter emitter(target, module, how.options, source.slots);
+                                            emitter.trace_table = source.trace;
+                                            emitter.emit();
+                                            program.workgroup_size = module.workgroup_size;
+                                            workgroup_bytes = emitter.workgroup_bytes, subgroups = emitter.subgroups;
+                                            has_barriers = emitter.has_barriers;
+                                            return Emitted{has_barriers, emitter.narrowed()};
+                                        },
+                                        &stack_bytes));
+        program.narrowed = std::move(narrowed);
+        auto& code = static_cast<LoadedCode&>(*program.code);
+        program.run = reinterpret_cast<ComputeFunction>(code.find("kernel"));
+        if (!program.run) return missing(source);
+        program.workgroup_bytes = (workgroup_bytes + 63) / 64 * 64;
+        if (has_barriers) {
+            const auto frame_size = reinterpret_cast<void (*)(std::uint64_t*)>(code.find("frame_size"));
+            if (!frame_size) return missing(source);
+            std::uint64_t bytes = 0;
+            frame_size(&bytes);
+            program.workgroup_bytes += (bytes + 63) / 64 * 64 * subgroups;
+        }
+        return program;
+    }
+
+    /// As all_, with fewer lanes.
+    Expected<const Variant*> with_lanes(std::uint32_t lanes) {
+        const std::lock_guard lock(fewer_lanes_mutex_);
+        Variant& made = fewer_lanes_[lanes];
+        if (!made.generator) {
+            made.options = all_.options, made.options.lanes = lanes;
+            NACRE_TRY(made.generator, CodeGenerator::create(lanes, made.options.mode == ExecutionMode::fast));
+        }
+        return &made;
+    }
+
     static std::unexpected<Error> missing(const ShaderSource& source) {
         return fail(ErrorCode::internal, "compile shader", fmt::format("'{}'", source.name), "the code that was made has no entry",
                     "Purge the cache (nacre cache --purge) and try again.");
@@ -116,10 +149,11 @@ class ShaderCompilation final : public Compiler {
     };
 
     /// Runs `emit`, which gives an Emitted, on a new LLVM module and makes code of it.
+    /// @param too_large_stack  gets the bytes of stack that the code takes where that is too much
     template <typename Emit>
     Expected<std::shared_ptr<CompiledCode>> compile(const Variant& how, const ShaderSource& source, spv::ExecutionModel model,
                                                     const VertexInput& input, std::vector<NarrowedOperation>& narrowed,
-                                                    Emit&& emit) {
+                                                    Emit&& emit, std::uint64_t* too_large_stack = nullptr) {
         NACRE_TRY(const std::vector<std::uint32_t> words, legalize(source.spirv, source.specialization, source.name,
                                                                     {.keeps_variables = (how.options.checks & check_sanitize) != 0,
                                                                      .inlines_all = how.options.checks != 0 || source.trace}));
@@ -161,7 +195,18 @@ class ShaderCompilation final : public Compiler {
         if (use_disk_cache)
             if (auto found = cache_.load("cpu", key)) object = std::move(*found);
         if (object.empty()) {
-            NACRE_TRY(object, how.generator->compile(*target, std::string(source.name), emitted.has_coroutines));
+            NACRE_TRY(CodeGenerator::Object made,
+                      how.generator->compile(*target, std::string(source.name), emitted.has_coroutines));
+            if (made.stack_bytes > most_stack_bytes) {
+                if (too_large_stack) *too_large_stack = made.stack_bytes;
+                return fail(
+                    ErrorCode::unsupported, "compile shader", fmt::format("'{}'", source.name),
+                    fmt::format("its values take {} bytes of stack with {} lanes; {} are the most", made.stack_bytes,
+                                how.options.lanes, most_stack_bytes),
+                    fmt::format("Load parts of arrays and structures instead of whole ones{}.",
+                                how.options.lanes > min_lanes ? ", or choose fewer lanes (as in 'cpu:lanes=4')" : ""));
+            }
+            object = std::move(made.bytes);
             if (use_disk_cache) cache_.store("cpu", key, object);
         }
         NACRE_TRY(std::shared_ptr<LoadedCode> code, how.generator->load(std::move(object), std::string(source.name)));
@@ -181,6 +226,8 @@ class ShaderCompilation final : public Compiler {
     }
 
     Variant all_, subgroups_;
+    std::mutex fewer_lanes_mutex_;
+    std::map<std::uint32_t, Variant> fewer_lanes_;  ///< By their lanes.
     DiskCache cache_;
 };
 

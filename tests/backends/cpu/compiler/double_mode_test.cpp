@@ -434,6 +434,51 @@ TEST(DoubleMode, StructsAreTheSameInEveryMemoryAndAcrossCalls) {
     }
 }
 
+TEST(DoubleMode, VariablesThatTakeMoreThanTheStackRun) {
+    // 100 arrays, each small enough for the stack: 3 MiB with 16 lanes. Indices that differ keep them from registers.
+    const int count = 100, length = 256;
+    std::string text = prelude + result + "void main() {\n";
+    for (int i = 0; i < count; ++i) {
+        const std::string name = "a" + std::to_string(i);
+        text += "float " + name + "[" + std::to_string(length) + "];\n";
+        text += "for (uint i = 0u; i < " + std::to_string(length) + "u; ++i) " + name + "[(i * 5u + at) % " +
+                std::to_string(length) + "u] = float(i) / float(at + " + std::to_string(i + 3) + "u);\n";
+    }
+    text += "float sum = 0.0;\n";
+    for (int i = 0; i < count; ++i)
+        text += "sum += a" + std::to_string(i) + "[(at * 7u + " + std::to_string(i) + "u) % " + std::to_string(length) + "u];\n";
+    text += "result[at] = exactly(sum); }\n";
+    Bench bench("cpu:double");
+    const Buffer to = bench.storage(64 * 8);
+    bench.dispatch(text, {{.binding = 0, .buffer = to}});
+    const auto found = bench.read<double>(to, 64);
+    for (int at = 0; at < 64; ++at) {
+        double sum = 0;
+        for (int i = 0; i < count; ++i) {
+            int from = 0;  // What was put where it is read.
+            while ((from * 5 + at) % length != (at * 7 + i) % length) ++from;
+            sum += static_cast<double>(from) / (at + i + 3);
+        }
+        EXPECT_DOUBLE_EQ(found[static_cast<std::size_t>(at)], sum) << at;
+    }
+}
+
+TEST(DoubleMode, ValuesThatTakeMoreThanTheStackRunWithFewerLanes) {
+    // A copy of an array holds all of it in registers, which are on the stack: 3.4 MiB with 16 lanes.
+    const int length = 28000;
+    const std::string text = prelude + result + "void main() { float a[" + std::to_string(length) + "], b[" +
+                             std::to_string(length) + "];\n"
+                             "for (uint i = 0u; i < a.length(); ++i) a[(i + at) % a.length()] = 1.0 / float(i + 3u);\n"
+                             "b = a; a[at] = 2.0;\n"
+                             "result[at] = exactly(b[2u * at] + a[at]); }\n";
+    Bench bench("cpu:double");
+    const Buffer to = bench.storage(64 * 8);
+    bench.dispatch(text, {{.binding = 0, .buffer = to}});
+    const auto found = bench.read<double>(to, 64);
+    for (std::size_t at = 0; at < 64; ++at)
+        EXPECT_DOUBLE_EQ(found[at], 1.0 / static_cast<double>(at + 3) + 2.0) << at;
+}
+
 TEST(DoubleMode, BitsPackingAndAtomicsGoThroughSinglePrecision) {
     Bench bench("cpu:double");
     const Buffer to = bench.storage(64 * 3 * 8);
