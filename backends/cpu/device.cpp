@@ -56,8 +56,8 @@ CpuDevice::CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc&
                      std::unique_ptr<Compiler> compiler)
     : mode_(options.mode),
       adapter_(describe_machine()),
-      // Results must not depend on the lanes where arithmetic is consistent, so neither may the subgroup.
-      capabilities_(find_capabilities(options.mode == ExecutionMode::consistent ? max_lanes : options.lanes)),
+      // Results must not depend on the lanes where arithmetic is not contracted, so neither may the subgroup.
+      capabilities_(find_capabilities(options.mode == ExecutionMode::fast ? options.lanes : max_lanes)),
       faults_(desc.desc->faults),
       memory_(std::make_shared<HostMemory>(machine_memory_bytes(), desc.desc->faults.fail_allocation)),
       checks_(options.checks),

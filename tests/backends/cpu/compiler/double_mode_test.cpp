@@ -446,7 +446,8 @@ TEST(DoubleMode, VariablesThatTakeMoreThanTheStackRun) {
     }
     text += "float sum = 0.0;\n";
     for (int i = 0; i < count; ++i)
-        text += "sum += a" + std::to_string(i) + "[(at * 7u + " + std::to_string(i) + "u) % " + std::to_string(length) + "u];\n";
+        text += "sum += a" + std::to_string(i) + "[(at * 7u + " + std::to_string(i) + "u) % " + std::to_string(length) +
+                "u];\n";
     text += "result[at] = exactly(sum); }\n";
     Bench bench("cpu:double");
     const Buffer to = bench.storage(64 * 8);
@@ -467,7 +468,8 @@ TEST(DoubleMode, ValuesThatTakeMoreThanTheStackRunWithFewerLanes) {
     // A copy of an array holds all of it in registers, which are on the stack: 3.4 MiB with 16 lanes.
     const int length = 28000;
     const std::string text = prelude + result + "void main() { float a[" + std::to_string(length) + "], b[" +
-                             std::to_string(length) + "];\n"
+                             std::to_string(length) +
+                             "];\n"
                              "for (uint i = 0u; i < a.length(); ++i) a[(i + at) % a.length()] = 1.0 / float(i + 3u);\n"
                              "b = a; a[at] = 2.0;\n"
                              "result[at] = exactly(b[2u * at] + a[at]); }\n";
@@ -475,8 +477,7 @@ TEST(DoubleMode, ValuesThatTakeMoreThanTheStackRunWithFewerLanes) {
     const Buffer to = bench.storage(64 * 8);
     bench.dispatch(text, {{.binding = 0, .buffer = to}});
     const auto found = bench.read<double>(to, 64);
-    for (std::size_t at = 0; at < 64; ++at)
-        EXPECT_DOUBLE_EQ(found[at], 1.0 / static_cast<double>(at + 3) + 2.0) << at;
+    for (std::size_t at = 0; at < 64; ++at) EXPECT_DOUBLE_EQ(found[at], 1.0 / static_cast<double>(at + 3) + 2.0) << at;
 }
 
 TEST(DoubleMode, BitsPackingAndAtomicsGoThroughSinglePrecision) {
@@ -516,6 +517,17 @@ TEST(DoubleMode, WhatGoesThroughSinglePrecisionIsListedWithItsLine) {
     single.compute("layout(local_size_x = 1) in; layout(set = 0, binding = 0) buffer R { float f; uint u; } r;\n"
                    "void main() { r.u = floatBitsToUint(r.f); }\n");
     EXPECT_TRUE(single.device().narrowed_operations().empty());
+}
+
+TEST(DoubleMode, SubgroupsAreAsLargeAsTheDeviceSays) {
+    for (const char* backend : {"cpu:double", "cpu:double:lanes=4", "cpu:double:lanes=8"}) {
+        Bench bench(backend);
+        const Buffer to = bench.storage(64 * 8);
+        bench.dispatch("#extension GL_KHR_shader_subgroup_arithmetic : require\n" + prelude + result +
+                           "void main() { result[at] = exactly(subgroupAdd(1.0) + float(gl_SubgroupSize)); }\n",
+                       {{.binding = 0, .buffer = to}});
+        EXPECT_EQ(bench.read<double>(to, 64)[5], 2.0 * bench.device().capabilities().subgroup_size) << backend;
+    }
 }
 
 Texture make_texture(Bench& bench, Format format, TextureUsage usage, std::uint32_t size = 64, std::uint32_t mips = 1) {
@@ -681,6 +693,40 @@ TEST(DoubleMode, ValuesBetweenTheStagesAreInterpolatedInDouble) {
             EXPECT_NEAR(found[at + 2], linear, 1e-14) << x << " " << y;
             EXPECT_NEAR(found[at + 3], 1.0 / 3 + 5, 1e-15) << x << " " << y;
             EXPECT_NEAR(depths[at], linear, 1e-14) << x << " " << y;
+        }
+}
+
+TEST(DoubleMode, ArraysAndStructsBetweenTheStagesKeepDoublesWhateverTheIndex) {
+    Bench bench("cpu:double");
+    Picture picture(bench);
+    GraphicsPipelineDesc desc;
+    desc.color_targets = {{.format = Format::rgba32_float}};
+    const std::string types = "struct Pair { vec2 v; float a; };\n";
+    picture.draw(
+        desc,
+        types +
+            "layout(location = 0) out Pair pairs[3];\n"
+            "layout(location = 6) flat out int numbers[3];\n"
+            "void main() { for (int i = 0; i < 3; ++i) { float k = float(3 * i + gl_InstanceIndex + 3);\n"
+            "pairs[i].v = vec2(1.0 / k, 1.0 / (k + 1.0)); pairs[i].a = 1.0 / (k + 2.0);\n"
+            "numbers[i] = i + 7 + gl_InstanceIndex; }\n"
+            "gl_Position = vec4(gl_VertexIndex == 1 ? 3.0 : -1.0, gl_VertexIndex == 2 ? 3.0 : -1.0, 0.0, 1.0); }\n",
+        types +
+            "layout(location = 0) in Pair pairs[3];\n"
+            "layout(location = 6) flat in int numbers[3];\n"
+            "layout(location = 0) out vec4 color;\n"
+            "void main() { int i = int(gl_FragCoord.x) % 3, j = int(gl_FragCoord.y) % 2;\n"
+            "Pair pair = pairs[i]; color = vec4(pair.v[j], pairs[i].a, float(numbers[i]), pairs[2].v.x); }\n",
+        1);
+    const auto found = picture.texels();
+    for (std::size_t y = 0; y < 16; ++y)
+        for (std::size_t x = 0; x < 16; ++x) {
+            const double k = static_cast<double>(3 * (x % 3) + 3);
+            const double* texel = &found[(y * 16 + x) * 4];
+            EXPECT_NEAR(texel[0], 1.0 / (k + static_cast<double>(y % 2)), 1e-15) << x << " " << y;
+            EXPECT_NEAR(texel[1], 1.0 / (k + 2.0), 1e-15) << x << " " << y;
+            EXPECT_EQ(texel[2], static_cast<double>(x % 3 + 7)) << x << " " << y;
+            EXPECT_NEAR(texel[3], 1.0 / 9, 1e-15) << x << " " << y;
         }
 }
 
