@@ -21,4 +21,9 @@ struct ComputeRunner {
     [[nodiscard]] Expected<std::vector<std::uint32_t>> run_assembly(const std::string& text, std::uint32_t version) const;
 };
 
+/// "Lanes4" of "cpu:consistent:lanes=4", "Double" of "cpu:double": names of tests.
+inline std::string name_of_lanes(const std::string& spec) {
+    return spec == "cpu:double" ? "Double" : "Lanes" + spec.substr(spec.find('=') + 1);
+}
+
 }  // namespace nacre::cpu

@@ -15,7 +15,8 @@
 namespace nacre::cpu {
 namespace {
 
-constexpr const char* lane_specs[] = {"cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16"};
+constexpr const char* lane_specs[] = {"cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16",
+                                      "cpu:double"};
 
 class ForeignModule : public testing::TestWithParam<const char*> {
   public:
@@ -570,7 +571,7 @@ TEST_P(ForeignModule, InstructionSetsWithoutMeaningAreIgnoredAndStructuresCopied
 }
 
 INSTANTIATE_TEST_SUITE_P(Lanes, ForeignModule, testing::ValuesIn(lane_specs),
-                         [](const auto& parameter) { return "Lanes" + std::string(parameter.param).substr(21); });
+                         [](const auto& parameter) { return name_of_lanes(parameter.param); });
 
 // ---- Subgroups
 
