@@ -46,6 +46,12 @@ Component Emitter::of_bits(const Component& bits, const Type& scalar) {
     });
 }
 
+void Emitter::note_missing_shadow(const Pointer& pointer, const Type& scalar) {
+    // Pointers that are values do not carry it (see components_of). Push constants never have one.
+    if (scalar.bits == 32 && !pointer.shadow && pointer.storage != spv::StorageClass::PushConstant)
+        note_narrowed("variable pointer");
+}
+
 void Emitter::note_narrowed(const char* operation) {
     if (in_double() && current) narrowed_.emplace(current->offset, operation);
 }
@@ -73,6 +79,7 @@ Component Emitter::load_float(const Pointer& pointer, std::int64_t extra, const 
     bits.kind = TypeKind::integer, bits.bits = scalar.bits;
     const Component word = load_bytes(pointer, extra, bits);
     const Component plain = of_bits(word, scalar);
+    note_missing_shadow(pointer, scalar);
     if (!has_shadow(pointer, scalar)) return plain;
     bits.bits = 64;
     const Component shadow = load_bytes(shadow_of(pointer), extra * 2, bits);
@@ -87,6 +94,7 @@ void Emitter::store_float(const Pointer& pointer, std::int64_t extra, const Type
     Type bits;
     bits.kind = TypeKind::integer, bits.bits = scalar.bits;
     if (scalar.bits == 16) note_narrowed("store of 16 bits");
+    note_missing_shadow(pointer, scalar);
     store_bytes(pointer, extra, bits, bits_of(value, scalar));
     if (!has_shadow(pointer, scalar)) return;
     bits.bits = 64;

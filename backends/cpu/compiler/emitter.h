@@ -169,6 +169,8 @@ class Emitter {
     Component of_bits(const Component& bits, const Type& scalar);
     /// Lists the current instruction among those that go through single precision.
     void note_narrowed(const char* operation);
+    /// Lists it where it reaches a float of 32 bits through a pointer that leads to words without doubles.
+    void note_missing_shadow(const Pointer& pointer, const Type& scalar);
     // Traces (emit_trace.cpp); nothing without a trace_table.
     /// The invocation begins; `is_traced` has the lane of the traced one. `ids`: of each lane, for compute shaders.
     void begin_trace(llvm::Value* is_traced, std::vector<Component> ids);

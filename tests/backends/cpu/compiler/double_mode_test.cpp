@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <spirv-tools/libspirv.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -517,6 +518,83 @@ TEST(DoubleMode, WhatGoesThroughSinglePrecisionIsListedWithItsLine) {
     single.compute("layout(local_size_x = 1) in; layout(set = 0, binding = 0) buffer R { float f; uint u; } r;\n"
                    "void main() { r.u = floatBitsToUint(r.f); }\n");
     EXPECT_TRUE(single.device().narrowed_operations().empty());
+}
+
+TEST(DoubleMode, VariablePointersGoThroughSinglePrecisionAndAreListed) {
+    // id / 3 is stored through a pointer that depends on the lane, and through a plain one.
+    const std::string text = R"(
+        OpCapability Shader
+        OpCapability VariablePointersStorageBuffer
+        OpExtension "SPV_KHR_variable_pointers"
+        OpMemoryModel Logical GLSL450
+        OpEntryPoint GLCompute %main "main" %index
+        OpExecutionMode %main LocalSize 64 1 1
+        OpDecorate %index BuiltIn LocalInvocationIndex
+        OpDecorate %numbers DescriptorSet 0
+        OpDecorate %numbers Binding 0
+        OpDecorate %floats ArrayStride 4
+        OpDecorate %block Block
+        OpMemberDecorate %block 0 Offset 0
+        %void = OpTypeVoid
+        %bool = OpTypeBool
+        %uint = OpTypeInt 32 0
+        %float = OpTypeFloat 32
+        %floats = OpTypeRuntimeArray %float
+        %block = OpTypeStruct %floats
+        %block_pointer = OpTypePointer StorageBuffer %block
+        %pointer = OpTypePointer StorageBuffer %float
+        %input_pointer = OpTypePointer Input %uint
+        %index = OpVariable %input_pointer Input
+        %numbers = OpVariable %block_pointer StorageBuffer
+        %c0 = OpConstant %uint 0
+        %c1 = OpConstant %uint 1
+        %c64 = OpConstant %uint 64
+        %three = OpConstant %float 3
+        %main_type = OpTypeFunction %void
+        %main = OpFunction %void None %main_type
+        %start = OpLabel
+        %id = OpLoad %uint %index
+        %further = OpIAdd %uint %id %c64
+        %a = OpAccessChain %pointer %numbers %c0 %id
+        %b = OpAccessChain %pointer %numbers %c0 %further
+        %odd = OpBitwiseAnd %uint %id %c1
+        %is_odd = OpINotEqual %bool %odd %c0
+        %p = OpSelect %pointer %is_odd %b %a
+        %n = OpConvertUToF %float %id
+        %third = OpFDiv %float %n %three
+        OpStore %PLACE %third
+        OpReturn
+        OpFunctionEnd
+    )";
+    for (const bool is_variable : {false, true}) {
+        std::string with_place = text;
+        with_place.replace(text.find("%PLACE"), 6, is_variable ? "%p" : "%a");
+        std::vector<std::uint32_t> words;
+        ASSERT_TRUE(spvtools::SpirvTools(SPV_ENV_VULKAN_1_1).Assemble(with_place, &words));
+        Bench bench("cpu:double");
+        const ComputePipeline pipeline = Bench::ok(bench.device().create_compute_pipeline(
+            {.shader = Bench::ok(bench.device().create_shader(
+                 {.spirv = std::move(words), .stage = ShaderStage::compute, .name = "pointers"})),
+             .name = "pointers"}));
+        const std::vector<NarrowedOperation> expected = {{"pointers", "", "variable pointer"}};
+        EXPECT_EQ(bench.device().narrowed_operations(), is_variable ? expected : std::vector<NarrowedOperation>());
+        const Buffer numbers = bench.storage(128 * 4), to = bench.storage(64 * 8);
+        CommandList list = bench.device().create_command_list("pointers");
+        list.set_pipeline(pipeline);
+        list.set_bind_group(0, bench.group(pipeline, {{.binding = 0, .buffer = numbers}}));
+        list.dispatch({});
+        bench.run(std::move(list));
+        bench.dispatch(prelude + result +
+                           "layout(set = 0, binding = 1) buffer Numbers { float numbers[]; };\n"
+                           "void main() { result[at] = exactly(numbers[at + " +
+                           (is_variable ? "64u * (at % 2u)" : "0u") + "]); }\n",
+                       {{.binding = 0, .buffer = to}, {.binding = 1, .buffer = numbers}});
+        const auto found = bench.read<double>(to, 64);
+        for (std::size_t at = 0; at < 64; ++at) {
+            const double third = static_cast<double>(at) / 3;
+            EXPECT_EQ(found[at], is_variable ? static_cast<double>(static_cast<float>(third)) : third) << at;
+        }
+    }
 }
 
 TEST(DoubleMode, SubgroupsAreAsLargeAsTheDeviceSays) {
