@@ -64,6 +64,9 @@ enum class FormatSupport : std::uint32_t {
     vertex = 64,          ///< Vertex attribute.
     multisampled = 128,   ///< 4 samples as a color or depth target.
     storage_atomic = 256, ///< imageAtomic* in compute shaders.
+    uniform_texel_buffer = 512,   ///< Elements of BindingType::uniform_texel_buffer.
+    storage_texel_buffer = 1024,  ///< Elements of storage texel buffers: imageLoad and imageStore in compute shaders.
+    storage_texel_buffer_atomic = 2048,  ///< imageAtomic* on them.
 };
 constexpr FormatSupport operator|(FormatSupport a, FormatSupport b) {
     return static_cast<FormatSupport>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
