@@ -243,12 +243,12 @@ bool Emitter::emit_image(const Instruction& at) {
     const Value image = get(at.operand(0));
     image_root = image.image_root;
     const Type& type = module.type(image.image_type);
-    if (type.dim == spv::Dim::Buffer || type.dim == spv::Dim::SubpassData)
-        reject("texel buffers and subpass inputs are not supported");
+    if (type.dim == spv::Dim::SubpassData) reject("subpass inputs are not supported");
     std::vector<Component> coordinates = get(at.operand(1)).components;
     if (operation == ImageOperation::store && trace_table) {
         trace(at, 0, {at.operand(2)}, get(at.operand(2)).components);
-        trace_image_write(coordinates);
+        // Which invocation wrote a texel is asked of textures alone.
+        if (type.dim != spv::Dim::Buffer) trace_image_write(coordinates);
     }
     if (in_double() && image_integer_flag(image.image_type) == 0) {
         emit_double_image(at, {operation, is_projected, is_compared, is_implicit, first_operand});
