@@ -131,12 +131,15 @@ TEST_P(TexelBuffers, FetchedElementsMeanWhatTheyShould) {
         const auto found = evaluate<std::array<std::uint32_t, 4>>(
             "layout(local_size_x = 1) in;\n"
             "layout(set = 0, binding = 0) buffer Result { uvec4 result[]; };\n"
-            "layout(set = 0, binding = 1) uniform " + prefix(format) + "samplerBuffer source;\n"
-            "void main() {\n"
-            "    int at = int(gl_GlobalInvocationID.x);\n"
-            "    result[at] = " + (info(format).is_integer() ? "uvec4(" : "floatBitsToUint(") +
+            "layout(set = 0, binding = 1) uniform " +
+                prefix(format) +
+                "samplerBuffer source;\n"
+                "void main() {\n"
+                "    int at = int(gl_GlobalInvocationID.x);\n"
+                "    result[at] = " +
+                (info(format).is_integer() ? "uvec4(" : "floatBitsToUint(") +
                 "texelFetch(source, at));\n"
-            "}",
+                "}",
             count, {{.binding = 1, .buffer = source, .format = format}}, {count, 1, 1});
         const std::size_t bytes = info(format).block_bytes;
         for (std::size_t i = 0; i < count; ++i)
@@ -154,13 +157,15 @@ TEST_P(TexelBuffers, LoadedElementsMeanWhatTheyShould) {
         const auto found = evaluate<std::array<std::uint32_t, 4>>(
             "layout(local_size_x = 1) in;\n"
             "layout(set = 0, binding = 0) buffer Result { uvec4 result[]; };\n"
-            "layout(set = 0, binding = 1, " + qualifier(format) + ") uniform readonly " + prefix(format) +
+            "layout(set = 0, binding = 1, " +
+                qualifier(format) + ") uniform readonly " + prefix(format) +
                 "imageBuffer source;\n"
-            "void main() {\n"
-            "    int at = int(gl_GlobalInvocationID.x);\n"
-            "    result[at] = " + (info(format).is_integer() ? "uvec4(" : "floatBitsToUint(") +
+                "void main() {\n"
+                "    int at = int(gl_GlobalInvocationID.x);\n"
+                "    result[at] = " +
+                (info(format).is_integer() ? "uvec4(" : "floatBitsToUint(") +
                 "imageLoad(source, at));\n"
-            "}",
+                "}",
             count, {{.binding = 1, .buffer = source, .format = format}}, {count, 1, 1});
         const std::size_t bytes = info(format).block_bytes;
         for (std::size_t i = 0; i < count; ++i)
@@ -177,16 +182,19 @@ TEST_P(TexelBuffers, StoredElementsAreWhatWasWritten) {
         const Buffer written = buffer(count * facts.block_bytes, BufferUsage::storage_texel, "written");
         // Values that differ from element to element and channel to channel, in the range of every format.
         const bool is_integer = facts.is_integer();
-        const std::string value = is_integer                         ? "(at + ivec4(0, 1, 2, 3)) % 100"
+        const std::string value = is_integer                        ? "(at + ivec4(0, 1, 2, 3)) % 100"
                                   : facts.kind == FormatKind::snorm ? "(vec4(at, at + 1, at + 2, at + 3) - 36.0) / 37.0"
-                                                                     : "vec4(at, at + 1, at + 2, at + 3) / 73.0";
+                                                                    : "vec4(at, at + 1, at + 2, at + 3) / 73.0";
         const ComputePipeline pipeline = compute(
             "layout(local_size_x = 7) in;\n"
-            "layout(set = 0, binding = 0, " + qualifier(format) + ") uniform writeonly " + prefix(format) +
-                "imageBuffer written;\n"
+            "layout(set = 0, binding = 0, " +
+            qualifier(format) + ") uniform writeonly " + prefix(format) +
+            "imageBuffer written;\n"
             "void main() {\n"
             "    int at = int(gl_GlobalInvocationID.x);\n"
-            "    imageStore(written, at, " + prefix(format) + "vec4(" + value + "));\n"
+            "    imageStore(written, at, " +
+            prefix(format) + "vec4(" + value +
+            "));\n"
             "}");
         dispatch(pipeline, {{.binding = 0, .buffer = written, .format = format}}, {count / 7, 1, 1});
         const auto bytes = read<std::byte>(written);
@@ -195,9 +203,9 @@ TEST_P(TexelBuffers, StoredElementsAreWhatWasWritten) {
                 decode_texel(format, std::span(bytes).subspan(i * facts.block_bytes, facts.block_bytes));
             for (std::size_t c = 0; c < facts.channels; ++c) {
                 const double at = static_cast<double>(i + c);
-                const double expected = is_integer                         ? std::fmod(at, 100.0)
+                const double expected = is_integer                        ? std::fmod(at, 100.0)
                                         : facts.kind == FormatKind::snorm ? (at - 36.0) / 37.0
-                                                                           : at / 73.0;
+                                                                          : at / 73.0;
                 // Of two bits of alpha integers keep what fits; no such format is here.
                 EXPECT_NEAR(found.channels[c], expected, found.step[c] * 1.01 + 1e-6)
                     << facts.name << ", element " << i << ", channel " << c;
@@ -319,8 +327,10 @@ TEST_P(TexelBuffers, EveryKindOfBindingSeesWhatTheOthersWrote) {
     const Buffer a = elements_of(start, usage, "a"), b = buffer(count * 4, usage, "b");
     const auto make = [&](const char* source, const char* read, const char* destination, const char* write) {
         return compute(std::string("layout(local_size_x = 64) in;\nlayout(set = 0, binding = 0") + source +
-                       "layout(set = 0, binding = 1" + destination + "void main() { uint i = gl_GlobalInvocationID.x; "
-                       "int to = int((i * 1021u + 17u) % 4096u); uint value = " + read + " + 1u; " + write + " }");
+                       "layout(set = 0, binding = 1" + destination +
+                       "void main() { uint i = gl_GlobalInvocationID.x; "
+                       "int to = int((i * 1021u + 17u) % 4096u); uint value = " +
+                       read + " + 1u; " + write + " }");
     };
     const char* const as_sampler = ") uniform usamplerBuffer source;\n";
     const char* const fetch = "texelFetch(source, int(i)).x";
@@ -331,15 +341,17 @@ TEST_P(TexelBuffers, EveryKindOfBindingSeesWhatTheOthersWrote) {
     const char* const store = "imageStore(destination, to, uvec4(value));";
     const char* const to_block = ") buffer Destination { uint destination[]; };\n";
     const char* const assign = "destination[to] = value;";
-    const std::array pipelines{make(as_sampler, fetch, to_image, store), make(as_image, load, to_block, assign),
-                               make(as_block, "source[i]", to_image, store), make(as_sampler, fetch, to_block, assign),
-                               make(as_image, load, to_image, store), make(as_block, "source[i]", to_block, assign)};
+    const std::array pipelines{
+        make(as_sampler, fetch, to_image, store),     make(as_image, load, to_block, assign),
+        make(as_block, "source[i]", to_image, store), make(as_sampler, fetch, to_block, assign),
+        make(as_image, load, to_image, store),        make(as_block, "source[i]", to_block, assign)};
     CommandList list = device().create_command_list("steps");
     for (std::size_t i = 0; i < 4 * pipelines.size(); ++i) {
         const ComputePipeline& pipeline = pipelines[i % pipelines.size()];
         list.set_pipeline(pipeline);
-        list.set_bind_group(0, group(pipeline, {{.binding = 0, .buffer = i % 2 == 0 ? a : b, .format = Format::r32_uint},
-                                                {.binding = 1, .buffer = i % 2 == 0 ? b : a, .format = Format::r32_uint}}));
+        list.set_bind_group(
+            0, group(pipeline, {{.binding = 0, .buffer = i % 2 == 0 ? a : b, .format = Format::r32_uint},
+                                {.binding = 1, .buffer = i % 2 == 0 ? b : a, .format = Format::r32_uint}}));
         list.dispatch({count / 64, 1, 1});
     }
     run(std::move(list));
@@ -363,8 +375,8 @@ TEST_P(TexelBuffers, AfterACopyTheNewElementsAreRead) {
         layout(set = 0, binding = 1) uniform samplerBuffer source;
         void main() { result[at] = texelFetch(source, 0); }
     )");
-    const BindGroup bound = group(pipeline, {{.binding = 0, .buffer = result},
-                                             {.binding = 1, .buffer = to, .format = Format::rgba32_float}});
+    const BindGroup bound = group(
+        pipeline, {{.binding = 0, .buffer = result}, {.binding = 1, .buffer = to, .format = Format::rgba32_float}});
     CommandList list = device().create_command_list("copies");
     for (std::uint32_t i = 0; i < 2; ++i) {
         if (i == 1) list.copy_buffer(from, 0, to, 0, 16);
@@ -423,16 +435,16 @@ TEST_P(TexelBuffers, InVertexAndFragmentShaders) {
     const Buffer positions = elements_of(corners, BufferUsage::uniform_texel, "corners");
     const Buffer palette = elements_of(colors, BufferUsage::uniform_texel, "palette");
     const Texture picture = target(Format::rgba8_unorm, 8, 2);
-    const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(
-        {.vertex = shader(ShaderStage::vertex, R"(
+    const GraphicsPipeline pipeline =
+        ok(device().create_graphics_pipeline({.vertex = shader(ShaderStage::vertex, R"(
             layout(set = 0, binding = 0) uniform samplerBuffer corners;
             void main() { gl_Position = vec4(texelFetch(corners, gl_VertexIndex).xy, 0.0, 1.0); })"),
-         .fragment = shader(ShaderStage::fragment, R"(
+                                              .fragment = shader(ShaderStage::fragment, R"(
             layout(set = 0, binding = 1) uniform samplerBuffer palette;
             layout(location = 0) out vec4 color;
             void main() { color = texelFetch(palette, int(gl_FragCoord.x)); })"),
-         .topology = Topology::triangle_strip,
-         .color_targets = {{.format = Format::rgba8_unorm}}}));
+                                              .topology = Topology::triangle_strip,
+                                              .color_targets = {{.format = Format::rgba8_unorm}}}));
     CommandList list = device().create_command_list("square");
     list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear}}});
     list.set_pipeline(pipeline);

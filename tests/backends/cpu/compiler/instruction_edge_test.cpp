@@ -306,6 +306,10 @@ std::vector<Row> float_rows() {
             const T product = y * std::floor(x / y);
             return x - product;
         }));
+        rows.push_back(extended<T>("InverseSqrt", 1, [](T x, T, T) {
+            const T root = std::sqrt(x);
+            return T(1) / root;
+        }));
         rows.push_back(extended<T>("Fma", 3, [](T x, T y, T z) { return std::fma(x, y, z); }));
         rows.push_back(unary<T, Half>("OpFConvert", [](T x) { return Half(static_cast<float>(x)); }));
     }
@@ -505,22 +509,24 @@ bool is_nan(const std::string& type, Word word) {
 template <typename T>
 void check(const std::vector<Row>& rows, const std::vector<Word>& edges) {
     ASSERT_EQ(edges.size(), 16u);
-    const ComputeRunner runner{.spec = "cpu:consistent", .result_words = static_cast<std::uint32_t>(rows.size() * 512)};
-    const auto found = runner.run_assembly(module_of<T>(rows, edges), 0x10300);
-    ASSERT_TRUE(found) << found.error().message();
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-        int wrong = 0;
-        for (std::size_t at = 0; at < 256 && wrong < 3; ++at) {
-            const Word x = edges[at / 16], y = edges[at % 16], z = edges[(at / 16 + at % 16) % 16];
-            const Word value = (*found)[i * 512 + at] | Word{(*found)[i * 512 + 256 + at]} << 32,
-                       expected = rows[i].expected(x, y, z);
-            const std::string& type = rows[i].result;
-            if (value == expected || (is_nan(type, value) && is_nan(type, expected))) continue;
-            const Word sign = type[0] == 'f' ? Word{1} << (std::stoi(type.substr(1)) - 1) : 0;
-            if (rows[i].either_zero && (value & ~sign) == 0 && (expected & ~sign) == 0) continue;
-            ADD_FAILURE() << rows[i].text
-                          << fmt::format(" of {:#x}, {:#x}, {:#x}: {:#x}, not {:#x}", x, y, z, value, expected);
-            ++wrong;
+    for (const char* spec : {"cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16"}) {
+        const ComputeRunner runner{.spec = spec, .result_words = static_cast<std::uint32_t>(rows.size() * 512)};
+        const auto found = runner.run_assembly(module_of<T>(rows, edges), 0x10300);
+        ASSERT_TRUE(found) << found.error().message();
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            int wrong = 0;
+            for (std::size_t at = 0; at < 256 && wrong < 3; ++at) {
+                const Word x = edges[at / 16], y = edges[at % 16], z = edges[(at / 16 + at % 16) % 16];
+                const Word value = (*found)[i * 512 + at] | Word{(*found)[i * 512 + 256 + at]} << 32,
+                           expected = rows[i].expected(x, y, z);
+                const std::string& type = rows[i].result;
+                if (value == expected || (is_nan(type, value) && is_nan(type, expected))) continue;
+                const Word sign = type[0] == 'f' ? Word{1} << (std::stoi(type.substr(1)) - 1) : 0;
+                if (rows[i].either_zero && (value & ~sign) == 0 && (expected & ~sign) == 0) continue;
+                ADD_FAILURE() << spec << ", " << rows[i].text
+                              << fmt::format(" of {:#x}, {:#x}, {:#x}: {:#x}, not {:#x}", x, y, z, value, expected);
+                ++wrong;
+            }
         }
     }
 }

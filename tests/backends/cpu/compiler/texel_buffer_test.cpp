@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Texel buffers at and behind the ends of their ranges, with lanes that differ: elements inside, zero and nothing
 // elsewhere, whatever lies around the range.
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -11,8 +13,6 @@
 #include <stdexcept>
 #include <string>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 #include "rhi/device.h"
 #include "rhi/shader_compiler.h"
@@ -36,10 +36,12 @@ struct Element {
 };
 constexpr Element elements[] = {
     // Those that compiled code reads by itself, then others.
-    {Format::r32_uint, "u", "r32ui"},     {Format::r32_sint, "i", "r32i"},     {Format::r32_float, "", "r32f"},
-    {Format::rgba16_float, "", "rgba16f"}, {Format::rgba8_unorm, "", "rgba8"},  {Format::rg32_uint, "u", "rg32ui"},
-    {Format::rgba32_float, "", "rgba32f"}, {Format::r8_uint, "u", "r8ui"},      {Format::r16_float, "", "r16f"},
-    {Format::rgba8_snorm, "", "rgba8_snorm"}, {Format::rgb10a2_unorm, "", "rgb10_a2"},
+    {Format::r32_uint, "u", "r32ui"},        {Format::r32_sint, "i", "r32i"},
+    {Format::r32_float, "", "r32f"},         {Format::rgba16_float, "", "rgba16f"},
+    {Format::rgba8_unorm, "", "rgba8"},      {Format::rg32_uint, "u", "rg32ui"},
+    {Format::rgba32_float, "", "rgba32f"},   {Format::r8_uint, "u", "r8ui"},
+    {Format::r16_float, "", "r16f"},         {Format::rgba8_snorm, "", "rgba8_snorm"},
+    {Format::rgb10a2_unorm, "", "rgb10_a2"},
 };
 
 /// What is asked for: around both ends, far away, and where a product with the bytes of an element overflows.
@@ -118,17 +120,19 @@ class TexelBuffers : public ::testing::TestWithParam<const char*> {
     }
     static std::string fetching(const Element& element, bool is_image) {
         const bool is_integer = info(element.format).is_integer();
-        return std::string("layout(local_size_x = 64) in;\n"
-                           "layout(set = 0, binding = 0) writeonly buffer Result { uvec4 result[]; };\n"
-                           "layout(set = 0, binding = 1) readonly buffer Indices { int indices[]; };\n"
-                           "layout(set = 0, binding = 2") +
+        return std::string(
+                   "layout(local_size_x = 64) in;\n"
+                   "layout(set = 0, binding = 0) writeonly buffer Result { uvec4 result[]; };\n"
+                   "layout(set = 0, binding = 1) readonly buffer Indices { int indices[]; };\n"
+                   "layout(set = 0, binding = 2") +
                (is_image ? std::string(", ") + element.layout + ") uniform readonly " + element.prefix + "imageBuffer"
                          : std::string(") uniform ") + element.prefix + "samplerBuffer") +
                " source;\nvoid main() {\n"
                "    uint i = gl_GlobalInvocationID.x;\n"
                "    if (i >= uint(indices.length())) return;\n"
-               "    result[i] = " + (is_integer ? "uvec4(" : "floatBitsToUint(") +
-               (is_image ? "imageLoad" : "texelFetch") + "(source, indices[i]));\n}\n";
+               "    result[i] = " +
+               (is_integer ? "uvec4(" : "floatBitsToUint(") + (is_image ? "imageLoad" : "texelFetch") +
+               "(source, indices[i]));\n}\n";
     }
 
     std::unique_ptr<Device> device_;
@@ -141,7 +145,8 @@ INSTANTIATE_TEST_SUITE_P(Cpu, TexelBuffers,
                                            "cpu:double", "cpu:sanitize", "cpu:hostile:lanes=8"),
                          [](const auto& parameter) {
                              std::string name = parameter.param;
-                             std::ranges::replace_if(name, [](char c) { return c == ':' || c == '='; }, '_');
+                             std::ranges::replace_if(
+                                 name, [](char c) { return c == ':' || c == '='; }, '_');
                              return name;
                          });
 
@@ -176,8 +181,8 @@ TEST_P(TexelBuffers, ReadsGiveElementsInsideAndZeroOutside) {
                     // Nothing but the last bit of a float may differ, and that of normalized formats alone.
                     const double tolerance = expected.step[c] == 0 ? 0 : std::abs(expected.channels[c]) * 0x1p-23;
                     ASSERT_NEAR(value, expected.channels[c], tolerance)
-                        << element.layout << (is_image ? " image" : " sampler") << ", index " << asked[i] << ", channel "
-                        << c;
+                        << element.layout << (is_image ? " image" : " sampler") << ", index " << asked[i]
+                        << ", channel " << c;
                 }
             }
         }
@@ -189,10 +194,13 @@ TEST_P(TexelBuffers, SizesAreThoseOfTheRange) {
         const Buffer content = buffer_of(surrounded(element.format));
         dispatch(std::string("layout(local_size_x = 1) in;\n"
                              "layout(set = 0, binding = 0) writeonly buffer Result { int result[]; };\n"
-                             "layout(set = 0, binding = 1) uniform ") + element.prefix + "samplerBuffer fetched;\n"
-                             "layout(set = 0, binding = 2, " + element.layout + ") uniform readonly " + element.prefix +
-                             "imageBuffer loaded;\n"
-                             "void main() { result[0] = textureSize(fetched); result[1] = imageSize(loaded); }\n",
+                             "layout(set = 0, binding = 1) uniform ") +
+                     element.prefix +
+                     "samplerBuffer fetched;\n"
+                     "layout(set = 0, binding = 2, " +
+                     element.layout + ") uniform readonly " + element.prefix +
+                     "imageBuffer loaded;\n"
+                     "void main() { result[0] = textureSize(fetched); result[1] = imageSize(loaded); }\n",
                  {{.binding = 0, .buffer = result}, range_of(content, element, 1), range_of(content, element, 2)});
         EXPECT_EQ(read<std::uint32_t>(result), (std::vector<std::uint32_t>{count, count})) << element.layout;
     }
@@ -207,14 +215,15 @@ TEST_P(TexelBuffers, StoresReachNothingOutside) {
         // Elements of even index stay as they are.
         dispatch(std::string("layout(local_size_x = 64) in;\n"
                              "layout(set = 0, binding = 1) readonly buffer Indices { int indices[]; };\n"
-                             "layout(set = 0, binding = 2, ") + element.layout + ") uniform writeonly " + element.prefix +
-                             "imageBuffer destination;\n"
-                             "void main() {\n"
-                             "    uint i = gl_GlobalInvocationID.x;\n"
-                             "    if (i >= uint(indices.length())) return;\n"
-                             "    int at = indices[i];\n"
-                             "    if ((at & 1) == 1) imageStore(destination, at, " + element.prefix + "vec4(" +
-                             (is_integer ? "7" : "1.0") + "));\n}\n",
+                             "layout(set = 0, binding = 2, ") +
+                     element.layout + ") uniform writeonly " + element.prefix +
+                     "imageBuffer destination;\n"
+                     "void main() {\n"
+                     "    uint i = gl_GlobalInvocationID.x;\n"
+                     "    if (i >= uint(indices.length())) return;\n"
+                     "    int at = indices[i];\n"
+                     "    if ((at & 1) == 1) imageStore(destination, at, " +
+                     element.prefix + "vec4(" + (is_integer ? "7" : "1.0") + "));\n}\n",
                  {{.binding = 1, .buffer = buffer_of(asked)}, range_of(content, element, 2)},
                  static_cast<std::uint32_t>(asked.size() + 63) / 64);
         const auto after = read<std::byte>(content);
@@ -242,9 +251,10 @@ TEST_P(TexelBuffers, WholeRowsOfNeighborsAreStored) {
         std::vector<std::byte> before(256 * bytes, std::byte{0x5a});
         const Buffer content = buffer_of(before);
         dispatch(std::string("layout(local_size_x = 64) in;\nlayout(set = 0, binding = 0, ") + element.layout +
-                     ") uniform writeonly " + element.prefix + "imageBuffer destination;\nvoid main() {\n"
-                     "    int at = int(gl_GlobalInvocationID.x);\n    imageStore(destination, at, " + element.prefix +
-                     "vec4(" + (facts.is_integer() ? "at % 128" : "float(at % 2)") + "));\n}\n",
+                     ") uniform writeonly " + element.prefix +
+                     "imageBuffer destination;\nvoid main() {\n"
+                     "    int at = int(gl_GlobalInvocationID.x);\n    imageStore(destination, at, " +
+                     element.prefix + "vec4(" + (facts.is_integer() ? "at % 128" : "float(at % 2)") + "));\n}\n",
                  {{.binding = 0, .buffer = content, .size = many * bytes, .format = element.format}}, 4);
         const auto after = read<std::byte>(content);
         for (std::size_t i = 0; i < 256; ++i) {
@@ -275,7 +285,8 @@ TEST_P(TexelBuffers, AtomicsOutsideGiveZeroAndChangeNothing) {
             result[2u * i + 1u] = imageAtomicCompSwap(words, indices[i], 0u, 9u);
         }
     )",
-             {{.binding = 0, .buffer = result}, {.binding = 1, .buffer = buffer_of(asked)},
+             {{.binding = 0, .buffer = result},
+              {.binding = 1, .buffer = buffer_of(asked)},
               range_of(content, elements[0], 2)},
              static_cast<std::uint32_t>(asked.size() + 63) / 64);
     const auto found = read<std::uint32_t>(result);

@@ -38,7 +38,8 @@ struct Range {
 class RangeArithmetic {
   public:
     explicit RangeArithmetic(const Precision& precision)
-        : precision_(precision), least_normal_(std::ldexp(1.0L, precision.least_exponent)),
+        : precision_(precision),
+          least_normal_(std::ldexp(1.0L, precision.least_exponent)),
           spacing_(std::ldexp(1.0L, precision.least_exponent - precision.bits + 1)) {}
 
     [[nodiscard]] Range value(long double x) const {
@@ -110,9 +111,15 @@ class RangeArithmetic {
     }
     [[nodiscard]] Range inverse_root(const Range& a) const {
         if (!a.has_numbers || a.high < 0) return nan();
-        return rounded({1 / std::sqrt(a.high), a.low <= 0 ? infinity() : 1 / std::sqrt(a.low),
-                        a.can_be_nan || a.low < 0},
-                       4);
+        return rounded(
+            {1 / std::sqrt(a.high), a.low <= 0 ? infinity() : 1 / std::sqrt(a.low), a.can_be_nan || a.low < 0}, 4);
+    }
+    [[nodiscard]] static Range clamp(const Range& a, long double low, long double high) {
+        // What becomes of NaN is open.
+        if (!a.has_numbers) return {low, high, true};
+        Range made{std::clamp(a.low, low, high), std::clamp(a.high, low, high), a.can_be_nan};
+        if (a.can_be_nan) made.low = low, made.high = high;
+        return made;
     }
     /// In any order.
     [[nodiscard]] Range sum(const std::vector<Range>& terms) const {
@@ -141,7 +148,9 @@ class RangeArithmetic {
 
   private:
     static long double infinity() { return std::numeric_limits<long double>::infinity(); }
-    static bool has_infinity(const Range& a, int sign) { return sign > 0 ? a.high == infinity() : a.low == -infinity(); }
+    static bool has_infinity(const Range& a, int sign) {
+        return sign > 0 ? a.high == infinity() : a.low == -infinity();
+    }
     static bool has_any_infinity(const Range& a) { return has_infinity(a, 1) || has_infinity(a, -1); }
     static bool has_zero(const Range& a) { return a.low <= 0 && a.high >= 0; }
     void flush(Range& range) const {
