@@ -338,38 +338,43 @@ TEST(FunctionEdges, PackingHoldsWhatTheFormatCan) {
         for (int i = 0; i < 4; ++i)
             text += fmt::format("result[at + {}u] = floatBitsToUint(v[{}]);\n", row++ * count, i);
     }
-    const ComputeRunner runner{.spec = "cpu:consistent", .result_words = static_cast<Word>(count * row)};
-    const auto found = runner.run_glsl(text + "}\n");
-    ASSERT_TRUE(found) << found.error().message();
-    for (std::size_t at = 0; at < count; ++at) {
-        const float x = numbers[at], y = numbers[(at + 5) % count];
-        const auto four = [&](float low, float scale) {
-            const Word a = normalized(x, low, scale, 255), b = normalized(y, low, scale, 255);
-            return a | b << 8 | b << 16 | a << 24;
-        };
-        const auto two = [&](float low, float scale) {
-            return normalized(x, low, scale, 65535) | normalized(y, low, scale, 65535) << 16;
-        };
-        EXPECT_EQ((*found)[at], four(0, 255)) << packed[0] << " of " << x << ", " << y;
-        EXPECT_EQ((*found)[count + at], four(-1, 127)) << packed[1] << " of " << x << ", " << y;
-        EXPECT_EQ((*found)[2 * count + at], two(0, 65535)) << packed[2] << " of " << x << ", " << y;
-        EXPECT_EQ((*found)[3 * count + at], two(-1, 32767)) << packed[3] << " of " << x << ", " << y;
-        for (std::size_t kind = 0; kind < 4; ++kind)
-            for (std::size_t i = 0; i < 4; ++i) {
-                const int width = kind < 2 ? 8 : 16;
-                const float expected = kind >= 2 && i >= 2
-                                           ? 0.0f
-                                           : unpacked(words[at] >> (width * static_cast<int>(i)), width, kind % 2 == 1);
-                EXPECT_EQ(as_float((*found)[(4 + kind * 4 + i) * count + at]), expected)
-                    << opened[kind] << "[" << i << "] of " << std::hex << words[at];
-            }
+    for (const char* spec : specs) {
+        SCOPED_TRACE(spec);
+        const ComputeRunner runner{.spec = spec, .result_words = static_cast<Word>(count * row)};
+        const auto found = runner.run_glsl(text + "}\n");
+        ASSERT_TRUE(found) << found.error().message();
+        for (std::size_t at = 0; at < count; ++at) {
+            const float x = numbers[at], y = numbers[(at + 5) % count];
+            const auto four = [&](float low, float scale) {
+                const Word a = normalized(x, low, scale, 255), b = normalized(y, low, scale, 255);
+                return a | b << 8 | b << 16 | a << 24;
+            };
+            const auto two = [&](float low, float scale) {
+                return normalized(x, low, scale, 65535) | normalized(y, low, scale, 65535) << 16;
+            };
+            EXPECT_EQ((*found)[at], four(0, 255)) << packed[0] << " of " << x << ", " << y;
+            EXPECT_EQ((*found)[count + at], four(-1, 127)) << packed[1] << " of " << x << ", " << y;
+            EXPECT_EQ((*found)[2 * count + at], two(0, 65535)) << packed[2] << " of " << x << ", " << y;
+            EXPECT_EQ((*found)[3 * count + at], two(-1, 32767)) << packed[3] << " of " << x << ", " << y;
+            for (std::size_t kind = 0; kind < 4; ++kind)
+                for (std::size_t i = 0; i < 4; ++i) {
+                    const int width = kind < 2 ? 8 : 16;
+                    const float expected = kind >= 2 && i >= 2 ? 0.0f
+                                                               : unpacked(words[at] >> (width * static_cast<int>(i)),
+                                                                          width, kind % 2 == 1);
+                    EXPECT_EQ(as_float((*found)[(4 + kind * 4 + i) * count + at]), expected)
+                        << opened[kind] << "[" << i << "] of " << std::hex << words[at];
+                }
+        }
     }
 }
 
 TEST(FunctionEdges, HalvesInAWordAreTheNearest) {
     // Every half, and floats half way between two.
-    const ComputeRunner runner{.spec = "cpu:consistent", .result_words = 65536 * 3};
-    const auto found = runner.run_glsl(R"(
+    for (const char* spec : specs) {
+        SCOPED_TRACE(spec);
+        const ComputeRunner runner{.spec = spec, .result_words = 65536 * 3};
+        const auto found = runner.run_glsl(R"(
         layout(local_size_x = 256) in;
         layout(set = 0, binding = 0) buffer Result { uint result[]; };
         void main() {
@@ -382,31 +387,32 @@ TEST(FunctionEdges, HalvesInAWordAreTheNearest) {
                 result[at * 3u + 2u] = packHalf2x16(vec2((value + next) * 0.5, 1e9));
             }
         })");
-    ASSERT_TRUE(found) << found.error().message();
-    const auto value_of = [](Word half) {
-        const int exponent = static_cast<int>(half >> 10 & 31), fraction = static_cast<int>(half & 1023);
-        const double magnitude = exponent == 0    ? fraction * 0x1p-24
-                                 : exponent == 31 ? (fraction ? std::nan("") : HUGE_VAL)
-                                                  : std::ldexp(1024 + fraction, exponent - 25);
-        return half & 0x8000 ? -magnitude : magnitude;
-    };
-    for (Word half = 0; half < 65536; ++half) {
-        const double value = value_of(half);
-        const float opened = as_float((*found)[half * 3]);
-        const Word packed = (*found)[half * 3 + 1], middle = (*found)[half * 3 + 2];
-        if (std::isnan(value)) {
-            ASSERT_TRUE(std::isnan(opened) && std::isnan(value_of(packed & 0xffff)) &&
-                        std::isnan(value_of(packed >> 16)))
-                << half;
-            continue;
-        }
-        ASSERT_EQ(as_bits(opened), as_bits(static_cast<float>(value))) << half;
-        ASSERT_EQ(packed, half | half << 16);
-        ASSERT_EQ(middle >> 16, 0x7c00u) << "what is too large becomes infinite";
-        const bool has_middle = (half & 0x7fff) < 0x7bff;
-        if (has_middle) {
-            // The even one of the two.
-            ASSERT_EQ(middle & 0xffff, half % 2 ? half + 1 : half) << half;
+        ASSERT_TRUE(found) << found.error().message();
+        const auto value_of = [](Word half) {
+            const int exponent = static_cast<int>(half >> 10 & 31), fraction = static_cast<int>(half & 1023);
+            const double magnitude = exponent == 0    ? fraction * 0x1p-24
+                                     : exponent == 31 ? (fraction ? std::nan("") : HUGE_VAL)
+                                                      : std::ldexp(1024 + fraction, exponent - 25);
+            return half & 0x8000 ? -magnitude : magnitude;
+        };
+        for (Word half = 0; half < 65536; ++half) {
+            const double value = value_of(half);
+            const float opened = as_float((*found)[half * 3]);
+            const Word packed = (*found)[half * 3 + 1], middle = (*found)[half * 3 + 2];
+            if (std::isnan(value)) {
+                ASSERT_TRUE(std::isnan(opened) && std::isnan(value_of(packed & 0xffff)) &&
+                            std::isnan(value_of(packed >> 16)))
+                    << half;
+                continue;
+            }
+            ASSERT_EQ(as_bits(opened), as_bits(static_cast<float>(value))) << half;
+            ASSERT_EQ(packed, half | half << 16);
+            ASSERT_EQ(middle >> 16, 0x7c00u) << "what is too large becomes infinite";
+            const bool has_middle = (half & 0x7fff) < 0x7bff;
+            if (has_middle) {
+                // The even one of the two.
+                ASSERT_EQ(middle & 0xffff, half % 2 ? half + 1 : half) << half;
+            }
         }
     }
 }

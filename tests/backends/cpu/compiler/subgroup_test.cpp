@@ -167,7 +167,8 @@ TEST(Subgroups, VotesAndBallots) {
          }},
         // A zero is equal to the other; two NaN are not, even of the same bits.
         {"words(subgroupAllEqual((id & 1u) == 0u ? 0.0 : -zero))", [](const Group&, std::uint32_t) { return 1; }},
-        {"words(subgroupAllEqual(zero / zero))", [](const Group&, std::uint32_t) { return 0; }},
+        {"words(subgroupAllEqual(nan))", [](const Group&, std::uint32_t) { return 0; }},
+        {"words(subgroupAllEqual(id < 1000u ? nan : zero))", [](const Group&, std::uint32_t) { return 0; }},
         {"words(subgroupAllEqual(vec2(1.0, float(id / 4u))))",
          [](const Group& g, std::uint32_t i) {
              const auto all = g.others(i);
@@ -206,7 +207,8 @@ TEST(Subgroups, VotesAndBallots) {
         {"gl_SubgroupGeMask.xy", [=](const Group& g, std::uint32_t i) { return below(g.size) & ~below(g.lane(i)); }},
     };
     check(rows, "",
-          "uint number = (id * 2654435761u) >> 7; bool odd = (number & 4u) != 0u; float zero = float(numbers[0]);\n");
+          "uint number = (id * 2654435761u) >> 7; bool odd = (number & 4u) != 0u; float zero = float(numbers[0]), nan "
+          "= uintBitsToFloat(0x7fc00000u + numbers[0]);\n");
 }
 
 TEST(Subgroups, ValuesOfOtherLanes) {
