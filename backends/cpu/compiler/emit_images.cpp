@@ -306,7 +306,12 @@ bool Emitter::emit_image(const Instruction& at) {
     }
     if (is_compared) {
         flags |= image_compare;
-        put_argument(offsetof(ImageArguments, reference), to_float(get_scalar(at.operand(2))));
+        Component reference = to_float(get_scalar(at.operand(2)));
+        // The reference is projected like the coordinates (Vulkan specification, "Projection Operation").
+        if (is_projected)
+            reference = apply({reference, coordinates.at(dimensions)},
+                              [&](auto v) { return builder.CreateFDiv(v[0], v[1]); });
+        put_argument(offsetof(ImageArguments, reference), reference);
     }
     if (operation == ImageOperation::gather && !is_compared)
         flags |= (module.constant_word(at.operand(2)).value_or(0) & 3) << image_component_shift;
@@ -404,7 +409,11 @@ void Emitter::emit_double_image(const Instruction& at, const ImageAccess& access
         put(offsetof(DoubleImageArguments, lod), more.lod ? get_scalar(more.lod) : Component(int32(0)), real);
     if (access.is_compared) {
         flags |= image_compare;
-        put(offsetof(DoubleImageArguments, reference), get_scalar(at.operand(2)), real);
+        Component reference = get_scalar(at.operand(2));
+        if (access.is_projected)
+            reference = apply({reference, coordinates.components.at(dimensions)},
+                              [&](auto v) { return builder.CreateFDiv(v[0], v[1]); });
+        put(offsetof(DoubleImageArguments, reference), reference, real);
     } else if (operation == ImageOperation::gather) {
         flags |= (module.constant_word(at.operand(2)).value_or(0) & 3) << image_component_shift;
     }
