@@ -37,7 +37,8 @@ class Blend final : public RenderPass {
                                    .depth_test = true,
                                    .depth_write = packed_,
                                    .depth_compare = rhi::CompareOperation::greater_or_equal},
-                 .frame_layout = context.lighting_layout};
+                 .frame_layout = context.lighting_layout,
+                 .closure_shader = "passes/closures/blend_"};
         desc_.defines.push_back({"HAS_POSITIONS"});
         FrameResources& resources = context.resources;
         camera_ = resources.camera;
