@@ -306,6 +306,12 @@ std::vector<Row> float_rows() {
             const T product = y * std::floor(x / y);
             return x - product;
         }));
+        if constexpr (std::is_same_v<T, float>)
+            rows.push_back(unary<T>("OpQuantizeToF16", [](T x) {
+                const Half half(x);
+                // Denormal halves are none of the values that it gives.
+                return std::abs(half) < 0x1p-14 ? std::copysign(T(0), x) : static_cast<T>(static_cast<double>(half));
+            }));
         rows.push_back(extended<T>("InverseSqrt", 1, [](T x, T, T) {
             const T root = std::sqrt(x);
             return T(1) / root;
