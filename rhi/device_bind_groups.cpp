@@ -53,7 +53,8 @@ class GroupBuilder {
                 std::move(remedy)};
     }
     Check add_buffer(const BindGroupEntry& entry, const BindingLayout& binding, BackendBinding& resolved);
-    /// The range of a texel buffer, of which `size` bytes are left or asked for; `size` becomes a whole number of elements.
+    /// The range of a texel buffer, of which `size` bytes are left or asked for; `size` becomes a whole number of
+    /// elements.
     Check check_texels(const BindGroupEntry& entry, BindingType type, const BufferDesc& buffer, std::uint64_t& size);
     Check add_texture(const BindGroupEntry& entry, const BindingLayout& binding, BackendBinding& resolved,
                       const SamplerDesc* sampler);

@@ -167,7 +167,8 @@ struct BindGroupEntry {
     std::uint32_t binding = 0;
     Buffer buffer{};
     std::uint64_t offset = 0;
-    std::uint64_t size = ~0ull;  ///< Bytes; default: to the end of the buffer (texel buffers: to its last whole element).
+    /// Bytes; default: to the end of the buffer, of texel buffers to the last whole element in it.
+    std::uint64_t size = ~0ull;
     TextureView texture{};
     Sampler sampler{};
     AccelerationStructure acceleration_structure{};

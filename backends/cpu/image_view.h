@@ -26,8 +26,8 @@ struct ImageLevel {
     std::uint32_t width = 0, height = 0, depth = 0;  ///< Texels.
     std::uint32_t row_stride = 0;                    ///< Bytes.
     std::uint64_t slice_stride = 0, layer_stride = 0, sample_stride = 0;
-    /// Of devices in double precision, else null: doubles for each texel, those of the texel at data + n * texel_bytes at
-    /// shadow + n * ImageView::shadow_doubles. See images/double_texels.h.
+    /// Of devices in double precision, else null: doubles for each texel, those of the texel at data + n * texel_bytes
+    /// at shadow + n * ImageView::shadow_doubles. See images/double_texels.h.
     double* shadow = nullptr;
 };
 

@@ -29,7 +29,8 @@ rhi::FormatSupport support_of(const Instance& instance, const PhysicalDevice& de
     if (facts.bufferFeatures & VK_FORMAT_FEATURE_VERTEX_BUFFER_BIT) support |= vertex;
     if (facts.bufferFeatures & VK_FORMAT_FEATURE_UNIFORM_TEXEL_BUFFER_BIT) support |= uniform_texel_buffer;
     if (facts.bufferFeatures & VK_FORMAT_FEATURE_STORAGE_TEXEL_BUFFER_BIT) support |= storage_texel_buffer;
-    if (facts.bufferFeatures & VK_FORMAT_FEATURE_STORAGE_TEXEL_BUFFER_ATOMIC_BIT) support |= storage_texel_buffer_atomic;
+    if (facts.bufferFeatures & VK_FORMAT_FEATURE_STORAGE_TEXEL_BUFFER_ATOMIC_BIT)
+        support |= storage_texel_buffer_atomic;
     const bool is_color_target = has & VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT;
     const bool is_depth_target = has & VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT;
     if (is_color_target || is_depth_target) {
