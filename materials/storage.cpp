@@ -497,6 +497,7 @@ Expected<UnpackedMaterial> unpack_pixel(const StoredPixel& pixel) {
         const auto medium = static_cast<StoredMedium>(read(StorageValue::medium));
         const bool has_albedo = read(StorageValue::has_albedo) != 0, is_below = read(StorageValue::is_below) != 0;
         if (frames > 1) result.frame = read(StorageValue::frame);
+        result.medium = medium;
         result.slab.features = features;
         result.slab.roughness = pixel.roughness;
         result.slab.albedo = glm::dvec3(0.0);

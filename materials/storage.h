@@ -161,6 +161,7 @@ struct UnpackedClosure {
     closures::Library::Slab slab;
     closures::Library::Path path;  ///< Its weight includes the closure's own coverage.
     std::uint32_t frame = 0;
+    StoredMedium medium = StoredMedium::opaque;
 };
 
 struct UnpackedMaterial {

@@ -44,6 +44,7 @@ Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPass
         if (uses_materials_) {
             defines = fragment_defines(key.features);
             defines.insert(defines.end(), desc.defines.begin(), desc.defines.end());
+            if (by_closures) defines.insert(defines.end(), desc.closure_defines.begin(), desc.closure_defines.end());
             const std::string path =
                 by_closures ? fmt::format("{}{}.frag", desc.closure_shader, key.topology) : desc.fragment_shader;
             fragment = rhi::ShaderSource{.path = path, .defines = std::move(defines)};
@@ -57,7 +58,7 @@ Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPass
         pipeline.cull = key.cull;
         pipeline.front_face = key.mirrored ? rhi::FrontFace::clockwise : rhi::FrontFace::counter_clockwise;
         pipeline.depth_stencil = desc.depth_stencil;
-        pipeline.color_targets = desc.color_targets;
+        pipeline.color_targets = by_closures && !desc.closure_color_targets.empty() ? desc.closure_color_targets : desc.color_targets;
         pipeline.name = desc.name;
         NACRE_TRY(const rhi::ReloadableGraphicsPipeline made,
                   context.shaders.graphics_pipeline(desc.name, pipeline, vertex, fragment));

@@ -101,6 +101,8 @@ struct GeometryPassDesc {
     /// Fragment shader of materials that are shaded by closures: "passes/closures/base_pass_" for base_pass_N.frag, N the
     /// topology. Empty: the pass draws them as plain slabs.
     std::string closure_shader;
+    std::vector<rhi::ShaderDefine> closure_defines;           ///< For those shaders alone.
+    std::vector<rhi::ColorTargetState> closure_color_targets; ///< Of those shaders; empty: as color_targets.
     rhi::BindGroupLayout closure_layout{};  ///< Of set 2 of those shaders, where they write slices of material words.
     bool culls = true;                      ///< Back faces of one-sided materials are not drawn.
 };

@@ -312,7 +312,7 @@ std::vector<rhi::ShaderDefine> SceneClosures::lighting_defines() const {
     }
     if (lighting_.has_layers) defines.push_back({"NACRE_STORED_LAYERS"});
     if (lighting_.slices > 0) defines.push_back({"MATERIAL_SLICES", std::to_string(lighting_.slices)});
-    if (lighting_.has_subsurface) defines.push_back({"SUBSURFACE_SLICE"});
+    if (lighting_.has_subsurface) defines.push_back({"SUBSURFACE_SLICE", std::to_string(lighting_.slices - 1)});
     return defines;
 }
 

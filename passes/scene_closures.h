@@ -65,7 +65,7 @@ class SceneClosures {
         std::uint32_t frames = 1;
         bool has_layers = false;          ///< Closures lie below others.
         bool has_subsurface = false;
-        std::uint32_t slices = 0;         ///< Of the storage image: words beyond the second, and subsurface data.
+        std::uint32_t slices = 0;         ///< Of the storage image: words beyond the second; last, subsurface data.
         std::uint32_t bytes = 12;         ///< Largest of a pixel.
     };
     [[nodiscard]] const Lighting& lighting() const { return lighting_; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The base pass of materials with several lobes: behind the text of a topology (passes/scene_closures.h). Words beyond
-// the color targets go into the slices of a storage image, subsurface data first where the scene has some.
+// the color targets go into the slices of a storage image, subsurface data into the last where the scene has some.
 #include "passes/shared/closure_inputs.glsl"
 #include "passes/shared/gbuffer_fields.glsl"
 
@@ -40,12 +40,9 @@ void main() {
     top_layer = top_normal | pack_roughness(state.slabs[stored_top_closure].roughness);
 #ifdef WRITES_SLICES
 #ifdef SUBSURFACE_SLICE
-    if (stored_has_subsurface) store_slice(pixel, 0, subsurface);
-    const uint first_slice = 1u;
-#else
-    const uint first_slice = 0u;
+    if (stored_has_subsurface) store_slice(pixel, SUBSURFACE_SLICE, subsurface);
 #endif
-    for (uint i = 2u; i < stored_words; ++i) store_slice(pixel, int(first_slice + i - 2u), words[i]);
+    for (uint i = 2u; i < stored_words; ++i) store_slice(pixel, int(i - 2u), words[i]);
 #endif
 #endif
 }

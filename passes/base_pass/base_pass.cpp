@@ -34,7 +34,9 @@ class BasePass final : public RenderPass {
                  .closure_shader = "passes/closures/base_pass_"};
         const std::uint32_t slices = context.closures.lighting().slices;
         if (slices > 0) desc_.defines.push_back({"MATERIAL_SLICES", std::to_string(slices)});
-        if (context.closures.lighting().has_subsurface) desc_.defines.push_back({"SUBSURFACE_SLICE"});
+        if (context.closures.lighting().has_subsurface) {
+            desc_.defines.push_back({"SUBSURFACE_SLICE", std::to_string(slices - 1)});
+        }
         selected_ = select_draws(context.geometry, [](const Draw& draw) {
             return draw.alpha_mode != materials::AlphaMode::blend;
         });

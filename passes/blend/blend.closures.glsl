@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blended materials with several lobes: behind the text of a topology (passes/scene_closures.h). What they let through,
-// in the mean of the channels, is what is left of the picture behind them.
+// Blended materials with several lobes: behind the text of a topology (passes/scene_closures.h). What they let through is
+// what is left of the picture behind them: for each channel with DUAL_SOURCE, else in the mean of the channels.
 layout(early_fragment_tests) in;
 #include "passes/shared/closure_inputs.glsl"
 #include "passes/shared/closure_lighting.glsl"
@@ -8,6 +8,9 @@ layout(early_fragment_tests) in;
 #include "passes/shared/shared_exponent.glsl"
 layout(location = 0) out uint out_color;
 layout(location = 1) out uint out_coverage;
+#elif defined(DUAL_SOURCE)
+layout(location = 0, index = 0) out vec4 out_color;
+layout(location = 0, index = 1) out vec4 out_through;
 #else
 layout(location = 0) out vec4 out_color;
 #endif
@@ -34,12 +37,16 @@ void main() {
         );
     }
     color += tree_emission(state);
-    float through = clamp(dot(matter_throughput(state.whole), vec3(1.0 / 3.0)), 0.0, 1.0);
+    vec3 colored = clamp(matter_throughput(state.whole), vec3(0.0), vec3(1.0));
+    float through = dot(colored, vec3(1.0 / 3.0));
     color = min(color, vec3(65504.0));
 #ifdef PACKED
     out_color = pack_shared_exponent(color);
     out_coverage = uint((1.0 - through) * 65535.0 + 0.5);
 #else
     out_color = vec4(color, 1.0 - through);
+#ifdef DUAL_SOURCE
+    out_through = vec4(colored, 1.0);
+#endif
 #endif
 }

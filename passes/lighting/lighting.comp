@@ -3,7 +3,7 @@
 // Lights the tiles of one list. SLAB, UNLIT: what pixels of these tiles can hold. TILE_LIST: which list.
 // EMISSION_TARGET: emission was drawn into an integer target and is added here.
 // CLOSURES: pixels may hold materials of several lobes, whose features' macros are defined; MATERIAL_SLICES: slices with
-// the words beyond the second, SUBSURFACE_SLICE: the first of them holds subsurface data.
+// the words beyond the second, SUBSURFACE_SLICE: which of them holds subsurface data.
 #include "passes/shared/gbuffer_fields.glsl"
 #include "passes/shared/half.glsl"
 #include "passes/shared/shared_exponent.glsl"
@@ -50,17 +50,12 @@ layout(set = 1, binding = 11) uniform usampler2D material_slices;
 #define fetch_slice(pixel, slice) texelFetch(material_slices, pixel, 0).r
 #endif
 #endif
-#ifdef SUBSURFACE_SLICE
-const uint first_slice = 1u;
-#else
-const uint first_slice = 0u;
-#endif
 
 ivec2 stored_pixel;
 uint first_words[2];
 uint material_word(uint index) {
 #ifdef MATERIAL_SLICES
-    if (index >= 2u) return fetch_slice(stored_pixel, int(min(first_slice + index - 2u, uint(MATERIAL_SLICES - 1))));
+    if (index >= 2u) return fetch_slice(stored_pixel, int(min(index - 2u, uint(MATERIAL_SLICES - 1))));
 #endif
     return index == 0u ? first_words[0] : first_words[1];
 }
@@ -74,7 +69,7 @@ vec3 shade_closures(ivec2 pixel, uint word_0, uint word_1, uint top, vec3 positi
     float roughness = unpack_roughness(top);
     uint subsurface = 0u;
 #ifdef SUBSURFACE_SLICE
-    subsurface = fetch_slice(pixel, 0);
+    subsurface = fetch_slice(pixel, SUBSURFACE_SLICE);
 #endif
     StoredHeader header = read_stored_header(normal);
     LitPoint point;
