@@ -32,7 +32,7 @@ inline constexpr std::uint32_t most_workgroup_bytes = 65536;  ///< Of the variab
 struct Descriptor {
     std::byte* data;              ///< Buffers: first byte of the bound range, aligned to 16.
     std::uint64_t size;           ///< Buffers: bytes of the bound range.
-    const ImageView* image;       ///< Textures and images.
+    const ImageView* image;       ///< Textures, images and texel buffers.
     union {
         const SamplerState* sampler;  ///< Samplers and combined texture samplers.
         /// Buffers of devices in double precision: the double of each 32-bit word of the range, at twice the word's

@@ -115,7 +115,12 @@ bool Emitter::emit_subgroup(const Instruction& at) {
             const Value value = operand_value(at.op == Op::OpSubgroupAllEqualKHR ? 0 : 1);
             llvm::Value* equal = builder.getTrue();
             for (const Component& component : value.components) {
-                if (component.is_uniform()) continue;
+                if (component.is_uniform()) {
+                    // NaN is not equal to itself.
+                    if (component.value->getType()->isFloatingPointTy())
+                        equal = builder.CreateAnd(equal, builder.CreateFCmpORD(component.value, component.value));
+                    continue;
+                }
                 llvm::Value* first = splat(narrow(component, mask));
                 llvm::Value* same = first->getType()->isFPOrFPVectorTy() ? builder.CreateFCmpOEQ(component.value, first)
                                                                          : builder.CreateICmpEQ(component.value, first);

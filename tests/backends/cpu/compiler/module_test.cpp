@@ -498,6 +498,85 @@ TEST_P(ForeignModule, DotProductsOfIntegers) {
     }, 256);
 }
 
+TEST_P(ForeignModule, SaturatingDotProductsStopAtTheEnds) {
+    const std::string text = assembly_head(R"(
+        OpCapability Shader
+        OpCapability DotProduct
+        OpCapability DotProductInput4x8BitPacked
+        OpExtension "SPV_KHR_integer_dot_product"
+    )", R"(
+        %near_end = OpConstant %uint 4294960000
+        %least = OpConstant %int -2147480000
+        %threes = OpConstant %uint 50529027
+        %most = OpConstant %uint 4294967295
+        %highest = OpConstant %uint 2155905152
+        %main = OpFunction %void None %main_type
+        %start = OpLabel
+        %id = OpLoad %uint %index
+        %packed = OpIMul %uint %id %threes
+        %unsigned_sum = OpUDotAccSat %uint %packed %most %near_end PackedVectorFormat4x8Bit
+        %mixed_sum = OpSUDotAccSat %int %highest %packed %least PackedVectorFormat4x8Bit
+        %mixed_bits = OpBitcast %uint %mixed_sum
+        %two = OpIMul %uint %id %c2
+        %place = OpIAdd %uint %two %c1
+        %out_0 = OpAccessChain %pointer %result %c0 %two
+        %out_1 = OpAccessChain %pointer %result %c0 %place
+        OpStore %out_0 %unsigned_sum
+        OpStore %out_1 %mixed_bits
+        OpReturn
+        OpFunctionEnd
+    )", false);
+    // Four bytes of 3 * id; times 255 as unsigned, times -128 as signed ones.
+    static_assert(50529027 == 0x03030303 && 2155905152 == 0x80808080);
+    expect(ComputeRunner{GetParam(), 128}.run_assembly(text, 0x10300), [](std::uint32_t at) {
+        const std::int64_t byte = at / 2 * 3;
+        if (at % 2 == 0) return static_cast<std::uint32_t>(std::min<std::int64_t>(4294960000 + 4 * 255 * byte, 0xffffffff));
+        return static_cast<std::uint32_t>(std::max<std::int64_t>(-2147480000 - 4 * 128 * byte, -2147483648));
+    }, 128);
+}
+
+TEST_P(ForeignModule, FormsThatGlslDoesNotMake) {
+    std::string text = assembly_head(R"(
+        OpCapability Shader
+        OpCapability VariablePointers
+        OpCapability VariablePointersStorageBuffer
+    )", R"(
+        %array = OpTypeArray %uint %c3
+        %array_pointer = OpTypePointer Function %array
+        %local_pointer = OpTypePointer Function %uint
+        %none = OpConstantNull %array
+        %semantics = OpConstant %uint 72
+        %main = OpFunction %void None %main_type
+        %start = OpLabel
+        %first = OpVariable %array_pointer Function %none
+        %second = OpVariable %array_pointer Function
+        %id = OpLoad %uint %index
+        %in = OpAccessChain %pointer %numbers %c0 %id
+        %out = OpAccessChain %pointer %result %c0 %id
+        %slot = OpAccessChain %local_pointer %first %c2
+        OpCopyMemory %slot %in
+        OpCopyMemory %second %first
+        %other = OpAccessChain %local_pointer %second %c2
+        OpCopyMemory %out %other
+        %next = OpPtrAccessChain %pointer %in %c3
+        %more = OpLoad %uint %next
+        OpMemoryBarrier %c1 %semantics
+        %old = OpLoad %uint %out
+        %sum = OpIAdd %uint %old %more
+        OpAtomicStore %out %c1 %c0 %sum
+        OpReturn
+        OpFunctionEnd
+    )", false);
+    const auto replace = [&](const std::string& what, const std::string& with) {
+        ASSERT_NE(text.find(what), std::string::npos);
+        text.replace(text.find(what), what.size(), with);
+    };
+    // One decoration for both.
+    replace("OpDecorate %result DescriptorSet 0", "OpDecorate %in_set DescriptorSet 0\n%in_set = OpDecorationGroup");
+    replace("OpDecorate %numbers DescriptorSet 0", "OpGroupDecorate %in_set %result %numbers");
+    expect(ComputeRunner{GetParam()}.run_assembly(text, 0x10300), [](std::uint32_t id) { return id + id + 3; });
+}
+
 TEST_P(ForeignModule, SwitchesOnEightSixteenAndSixtyFourBits) {
     const auto module_for = [](int bits, const std::string& capability, const std::string& big) {
         return assembly_head("OpCapability Shader\nOpCapability " + capability + "\n", fmt::format(R"(

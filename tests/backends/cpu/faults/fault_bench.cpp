@@ -43,8 +43,9 @@ FaultBench::FaultBench(const std::string& backend) {
         const std::scoped_lock lock(mutex_);
         messages_.push_back(message);
     });
-    constexpr rhi::BufferUsage buffer_usage =
-        rhi::BufferUsage::storage | rhi::BufferUsage::copy_source | rhi::BufferUsage::copy_destination;
+    constexpr rhi::BufferUsage buffer_usage = rhi::BufferUsage::storage | rhi::BufferUsage::uniform_texel |
+                                              rhi::BufferUsage::storage_texel | rhi::BufferUsage::copy_source |
+                                              rhi::BufferUsage::copy_destination;
     using enum rhi::TextureUsage;
     output = ok(device_->create_buffer({.size = 1024, .usage = buffer_usage, .name = "output"}));
     input = ok(device_->create_buffer({.size = 256, .usage = buffer_usage, .name = "input"}));
@@ -86,6 +87,9 @@ rhi::BindGroup FaultBench::bind(rhi::BindGroupLayout layout) {
         if (binding.binding == 3) entry.texture = rhi::TextureView{numbers};
         if (binding.binding == 5) entry.texture = rhi::TextureView{target}, entry.sampler = nearest;
         if (binding.binding == 4) entry.sampler = nearest;
+        if (binding.binding == 6) entry.buffer = output;
+        if (binding.binding == 7) entry.buffer = input;
+        if (binding.binding >= 6) entry.format = rhi::Format::r32_uint;
         group.entries.push_back(entry);
     }
     return ok(device_->create_bind_group(group));

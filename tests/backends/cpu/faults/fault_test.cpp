@@ -105,6 +105,36 @@ void main() {
     imageStore(picture, at - ivec2(0, 1), uvec4(1u)); // FAULT
 })",
      "N-804", "texture 'picture'", "invocation (0, 0, 0)"},
+    {"TrapTexelRange", "traps", "texels.comp", R"(layout(local_size_x = 8) in;
+layout(set = 0, binding = 7) uniform usamplerBuffer numbers;
+layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
+void main() {
+    int i = int(gl_GlobalInvocationID.x);
+    result.words[i] = texelFetch(numbers, i * 10).x; // FAULT
+})",
+     "N-804", "'numbers' (buffer 'input')", "invocation (7, 0, 0)"},
+    {"SanitizeTexelRange", "sanitize", "texel_image.comp", R"(layout(local_size_x = 8) in;
+layout(set = 0, binding = 6, r32ui) uniform writeonly uimageBuffer words;
+void main() {
+    imageStore(words, int(gl_GlobalInvocationID.x) * 64 - 192, uvec4(1u)); // FAULT
+})",
+     "N-804", "'words' (buffer 'output')", "invocation (0, 0, 0)"},
+    {"SanitizeTexelUnwritten", "sanitize", "unwritten_texel.comp", R"(layout(local_size_x = 8) in;
+layout(set = 0, binding = 6, r32ui) uniform uimageBuffer words;
+void main() {
+    int i = int(gl_GlobalInvocationID.x);
+    imageStore(words, i, uvec4(3u));
+    uint next = imageLoad(words, i == 5 ? 100 : i).x;
+    if (next > 100u) imageStore(words, i + 200, uvec4(1u)); // FAULT
+})",
+     "N-805", "'words' (buffer 'output'), read at unwritten_texel.comp:6", "invocation (5, 0, 0)"},
+    {"SanitizeTexelRace", "sanitize", "texel_race.comp", R"(layout(local_size_x = 8) in;
+layout(set = 0, binding = 6, r32ui) uniform uimageBuffer words;
+void main() {
+    int i = int(gl_GlobalInvocationID.x);
+    imageStore(words, i / 2, uvec4(i)); // FAULT
+})",
+     "N-806", "'words' (buffer 'output')", "invocation (1, 0, 0)"},
     {"SanitizeBufferIndex", "sanitize", "index.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
 layout(set = 0, binding = 1) readonly buffer Input { uint words[64]; } numbers;
@@ -325,6 +355,44 @@ TEST(CpuHostile, AWriteThatIsNotStatedIsLost) {
     EXPECT_TRUE(messages[0].code.starts_with("N-821"));
     EXPECT_THAT(messages[0].text, HasSubstr("buffer 'output'"));
     EXPECT_EQ(words[5], 7u);
+}
+
+TEST(CpuHostile, TexelBuffersAreUsesOfTheirBuffer) {
+    const std::string text = R"(layout(local_size_x = 64) in;
+layout(set = 0, binding = 6, r32ui) uniform writeonly uimageBuffer words;
+layout(set = 0, binding = 7) uniform usamplerBuffer numbers;
+void main() {
+    int i = int(gl_GlobalInvocationID.x);
+    imageStore(words, i, texelFetch(numbers, i));
+})";
+    const auto copy = [&](FaultBench& bench, const std::vector<rhi::StatedAccess>& accesses) {
+        const rhi::ComputePipeline pipeline = bench.make_compute("texels.comp", text);
+        rhi::CommandList list = bench.device().create_command_list("frame");
+        list.fill_buffer(bench.output, 7u);
+        list.begin_statement("copy", accesses);
+        list.set_pipeline(pipeline);
+        list.set_bind_group(0, bench.bind(pipeline));
+        list.dispatch({});
+        list.end_statement();
+        EXPECT_TRUE(bench.submit(std::move(list)));
+        return read_words(bench, bench.output);
+    };
+    const rhi::StatedAccess write{.buffer = {}, .use = rhi::ResourceUse::storage_write};
+    FaultBench stated("cpu:hostile");
+    rhi::StatedAccess to = write;
+    to.buffer = stated.output;
+    auto words = copy(stated, {{.buffer = stated.input, .use = rhi::ResourceUse::sampled}, to});
+    EXPECT_TRUE(stated.messages().empty());
+    EXPECT_EQ(words[5], 5u);
+    FaultBench unstated("cpu:hostile");
+    to.buffer = unstated.output;
+    words = copy(unstated, {to});
+    const auto messages = unstated.messages();
+    const rhi::Message* message = find_message(messages, "N-821");
+    ASSERT_TRUE(message);
+    EXPECT_THAT(message->text, HasSubstr("buffer 'input'"));
+    EXPECT_THAT(message->text, HasSubstr("sampled"));
+    EXPECT_NE(words[5], 5u);
 }
 
 TEST(CpuHostile, NoOrderOfWorkgroupsIsReliedOn) {
