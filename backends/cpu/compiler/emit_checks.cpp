@@ -353,7 +353,8 @@ void Emitter::check_range(const Pointer& pointer) {
                             v[0], llvm::ConstantInt::getSigned(v[0]->getType(), pointer.offset + bytes - 1));
                     })
             : Component(int64(pointer.offset + bytes - 1));
-    check_fault(ShaderFault::index_range, bad, pointer.path + ", counted in bytes", last, pointer.limit, &pointer);
+    const std::string object = (pointer.path.empty() ? "a buffer" : pointer.path) + ", counted in bytes";
+    check_fault(ShaderFault::index_range, bad, object, last, pointer.limit, &pointer);
 }
 
 void Emitter::check_quads() {
