@@ -74,7 +74,7 @@ bool Emitter::emit_subgroup(const Instruction& at) {
     };
     const auto lane_of = [&](Id id) {
         const Component lane = get_scalar(id);
-        check_undefined(std::span(&lane, 1), origin_of(id));
+        if (follows_undefined()) check_undefined(std::span(&lane, 1), origin_of(id));
         if (!lane.value->getType()->getScalarType()->isIntegerTy() || lane.value->getType()->getScalarType()->isIntegerTy(1))
             reject("the number of an invocation is no integer");
         return lane;
