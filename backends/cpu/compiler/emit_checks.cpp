@@ -529,11 +529,11 @@ llvm::Value* Emitter::call_check_memory(llvm::Value* site, llvm::Value* descript
     llvm::Value* undefined_bits = int32(0);
     if (undefined) undefined_bits = mask_bits(undefined->getType()->isVectorTy() ? undefined : splat(undefined));
     llvm::Type* word = builder.getInt32Ty();
-    llvm::Value* bits = builder.CreateCall(
-        external("nacre_cpu_check_memory", word,
-                 {pointer_type, pointer_type, pointer_type, pointer_type, word, word, word, word}),
-        {all.running, site, descriptors_at, addresses_at, int32(bytes),
-         int32(static_cast<std::int32_t>(access)), mask_bits(lanes_on), undefined_bits});
+    llvm::Value* bits =
+        builder.CreateCall(external("nacre_cpu_check_memory", word,
+                                    {pointer_type, pointer_type, pointer_type, pointer_type, word, word, word, word}),
+                           {all.running, site, descriptors_at, addresses_at, int32(bytes),
+                            int32(static_cast<std::int32_t>(access)), mask_bits(lanes_on), undefined_bits});
     return builder.CreateBitCast(builder.CreateTrunc(bits, builder.getIntNTy(lanes)), mask_type);
 }
 

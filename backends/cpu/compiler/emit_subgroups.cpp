@@ -103,7 +103,8 @@ bool Emitter::emit_subgroup(const Instruction& at) {
     const auto of_all = [&](std::vector<Component> result, std::span<const Component> values) {
         llvm::Value* undefined = nullptr;
         for (const Component& value : values)
-            if (llvm::Value* more = undefined_in(value)) undefined = undefined ? builder.CreateOr(undefined, more) : more;
+            if (llvm::Value* more = undefined_in(value))
+                undefined = undefined ? builder.CreateOr(undefined, more) : more;
         if (undefined) undefined = any(both(mask, undefined));
         for (Component& component : result) component.undefined = undefined;
         return result;
@@ -118,13 +119,16 @@ bool Emitter::emit_subgroup(const Instruction& at) {
         case Op::OpGroupNonUniformAll: case Op::OpSubgroupAllKHR: {
             const Component condition = condition_of(at.operand(at.op == Op::OpSubgroupAllKHR ? 0 : 1));
             if (condition.is_uniform()) set(at, {condition});
-            else set(at, of_all({Component(builder.CreateNot(any(both(mask, builder.CreateNot(condition.value)))))}, std::span(&condition, 1)));
+            else
+                set(at, of_all({Component(builder.CreateNot(any(both(mask, builder.CreateNot(condition.value)))))},
+                               std::span(&condition, 1)));
             return true;
         }
         case Op::OpGroupNonUniformAny: case Op::OpSubgroupAnyKHR: {
             const Component condition = condition_of(at.operand(at.op == Op::OpSubgroupAnyKHR ? 0 : 1));
             if (condition.is_uniform()) set(at, {condition});
-            else set(at, of_all({Component(any(condition_mask(condition)))}, std::span(&condition, 1)));
+            else
+                set(at, of_all({Component(any(condition_mask(condition)))}, std::span(&condition, 1)));
             return true;
         }
         case Op::OpGroupNonUniformAllEqual: case Op::OpSubgroupAllEqualKHR: {
@@ -142,7 +146,8 @@ bool Emitter::emit_subgroup(const Instruction& at) {
         }
         case Op::OpGroupNonUniformBroadcastFirst: case Op::OpSubgroupFirstInvocationKHR: {
             std::vector<Component> made;
-            for (const Component& component : operand_value(at.op == Op::OpSubgroupFirstInvocationKHR ? 0 : 1).components) {
+            for (const Component& component :
+                 operand_value(at.op == Op::OpSubgroupFirstInvocationKHR ? 0 : 1).components) {
                 made.emplace_back(narrow(component, mask));
                 if (component.undefined) made.back().undefined = narrow(Component(component.undefined), mask);
             }
@@ -188,7 +193,8 @@ bool Emitter::emit_subgroup(const Instruction& at) {
                 std::vector<std::uint32_t> below(lanes);
                 for (std::uint32_t i = 0; i < lanes; ++i)
                     below[i] = operation == spv::GroupOperation::InclusiveScan ? (2u << i) - 1 : (1u << i) - 1;
-                word = apply({word, Component(llvm::ConstantDataVector::get(context, below))}, [&](auto v) { return builder.CreateAnd(v[0], v[1]); });
+                word = apply({word, Component(llvm::ConstantDataVector::get(context, below))},
+                             [&](auto v) { return builder.CreateAnd(v[0], v[1]); });
             }
             set(at, {apply({word}, [&](auto v) { return math.bit_count(v[0]); })});
             return true;
@@ -233,7 +239,8 @@ bool Emitter::emit_subgroup(const Instruction& at) {
             std::vector<Component> made;
             for (const Component& component : operand_value(1).components) {
                 made.push_back(component.is_uniform() ? Component(widen(component)) : Component(permute(component.value, source)));
-                if (llvm::Value* undefined = undefined_in(component)) made.back().undefined = permute(undefined, source);
+                if (llvm::Value* undefined = undefined_in(component))
+                    made.back().undefined = permute(undefined, source);
             }
             set(at, std::move(made));
             return true;
@@ -279,7 +286,8 @@ bool Emitter::emit_subgroup(const Instruction& at) {
     if (operation == spv::GroupOperation::ClusteredReduce)
         cluster = std::min(lanes, std::max(1u, module.constant_word(at.operand(3)).value_or(lanes)));
     std::vector<Component> made;
-    const bool is_scan = operation == spv::GroupOperation::InclusiveScan || operation == spv::GroupOperation::ExclusiveScan;
+    const bool is_scan =
+        operation == spv::GroupOperation::InclusiveScan || operation == spv::GroupOperation::ExclusiveScan;
     const auto combined = [&](llvm::Value* values, const Combination& by) {
         llvm::Value* identity = splat(by.identity);
         values = select(mask, values, identity);
@@ -297,7 +305,8 @@ bool Emitter::emit_subgroup(const Instruction& at) {
             values = is_scan ? by.combine(moved, values) : by.combine(values, moved);
         }
         if (operation == spv::GroupOperation::ExclusiveScan) values = moved_by(values, 1, false);
-        return operation == spv::GroupOperation::Reduce ? builder.CreateExtractElement(values, std::uint64_t{0}) : values;
+        return operation == spv::GroupOperation::Reduce ? builder.CreateExtractElement(values, std::uint64_t{0})
+                                                        : values;
     };
     const Combination either{[&](auto* a, auto* b) { return builder.CreateOr(a, b); }, builder.getFalse()};
     for (const Component& component : operand_value(2).components) {

@@ -13,7 +13,8 @@ using rhi::FormatKind;
 using spv::BuiltIn;
 
 /// One component of an attribute, read from its buffer and converted as its format says.
-Component VertexEmitter::fetch(const std::string& name, const rhi::VertexAttribute& attribute, std::uint32_t component, const Type& scalar) {
+Component VertexEmitter::fetch(const std::string& name, const rhi::VertexAttribute& attribute, std::uint32_t component,
+                               const Type& scalar) {
     const rhi::FormatInfo& format = rhi::info(attribute.format);
     const bool is_integer = scalar.kind == TypeKind::integer;
     llvm::Type* word = builder.getInt32Ty();
@@ -83,8 +84,10 @@ Component VertexEmitter::fetch(const std::string& name, const rhi::VertexAttribu
     const auto to_result = [&](llvm::Value* value) -> Component {
         llvm::Type* kind = scalar_type(scalar);
         Component result(value);
-        if (is_integer) result = Component(builder.CreateZExtOrTrunc(value, like(value, kind)));
-        else if (value->getType()->getScalarType() != kind) result = Component(math.convert_float(value, kind));
+        if (is_integer)
+            result = Component(builder.CreateZExtOrTrunc(value, like(value, kind)));
+        else if (value->getType()->getScalarType() != kind)
+            result = Component(math.convert_float(value, kind));
         return noted(result);
     };
     const bool is_signed = format.kind == FormatKind::sint || format.kind == FormatKind::snorm;
@@ -158,7 +161,8 @@ std::vector<Component> VertexEmitter::input_components(const Variable& variable)
         if (at.is_wide) reject(fmt::format("input '{}' holds 64-bit values, of which no vertex format is made", variable.name));
         const auto attribute = std::ranges::find(input_.attributes, at.location, &rhi::VertexAttribute::location);
         if (attribute == input_.attributes.end()) made.push_back(zero(module.type(at.type)));
-        else made.push_back(fetch(variable.name, *attribute, at.component, module.type(at.type)));
+        else
+            made.push_back(fetch(variable.name, *attribute, at.component, module.type(at.type)));
     }
     return made;
 }

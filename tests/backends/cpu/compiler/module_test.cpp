@@ -615,9 +615,11 @@ TEST(Subgroups, HaveSixteenLanesWhereArithmeticIsConsistent) {
                 if (i % 5 < 2) ++few;
                 else least = std::min(least, i);
             });
-            const std::uint32_t expected[] = {sum, product, id ^ 9, ballot, most, 16, id % 16 + 100 * (id / 16) + 4000,
-                                              id % 5 < 2 ? few : least, before};
-            for (std::size_t i = 0; i < 9; ++i) ASSERT_EQ((*words)[id * 9 + i], expected[i]) << spec << " invocation " << id << " value " << i;
+            const std::uint32_t expected[] = {
+                sum,   product, id ^ 9, ballot, most, 16, id % 16 + 100 * (id / 16) + 4000, id % 5 < 2 ? few : least,
+                before};
+            for (std::size_t i = 0; i < 9; ++i)
+                ASSERT_EQ((*words)[id * 9 + i], expected[i]) << spec << " invocation " << id << " value " << i;
         }
     }
 }

@@ -3,7 +3,8 @@
 //
 //     cpu_clean_test                                   10 shaders with fixed seeds
 //     cpu_clean_test --seed=1000 --count=10000
-//     cpu_clean_test --seed=1000 --count=10000 --together   three of four on one device that makes all checks, which is quicker
+//     cpu_clean_test --seed=1000 --count=10000 --together   most with all checks on one device, which is quicker
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -14,8 +15,6 @@
 #include <string>
 #include <string_view>
 #include <vector>
-
-#include <fmt/format.h>
 
 #include "tests/backends/cpu/differential/device_runner.h"
 
@@ -29,12 +28,14 @@ struct Settings {
 
 constexpr std::array<const char*, 3> checks{"sanitize", "hostile=3", "sanitize:hostile=3"};
 
-/// Lanes of the devices that a shader runs on: mostly few, since those make little code and most time goes into compiling.
+/// Lanes of the devices that a shader runs on: mostly few, since those make little code and most time goes into
+/// compiling.
 std::uint32_t lanes_for(std::uint64_t seed) { return seed % 8 == 1 ? 16 : seed % 8 == 5 ? 8 : 4; }
 
 TEST(CpuClean, RandomShadersGiveNoReport) {
     std::map<std::string, std::unique_ptr<DeviceRunner>> runners;
-    const auto run = [&](const std::string& spec, const std::vector<std::uint32_t>& words, Stage stage) -> Expected<Output> {
+    const auto run = [&](const std::string& spec, const std::vector<std::uint32_t>& words,
+                         Stage stage) -> Expected<Output> {
         std::unique_ptr<DeviceRunner>& runner = runners[spec];
         if (!runner) {
             NACRE_TRY(runner, DeviceRunner::create(spec));

@@ -310,8 +310,10 @@ TEST(CpuFaults, AnUndefinedVertexAttributeIsReported) {
         SCOPED_TRACE(lanes);
         FaultBench bench(std::string("cpu:sanitize:lanes=") + lanes);
         rhi::Device& device = bench.device();
-        const auto vertices = device.create_buffer(
-            {.size = 3 * 16, .usage = rhi::BufferUsage::vertex | rhi::BufferUsage::copy_destination, .name = "corners"});
+        const auto vertices =
+            device.create_buffer({.size = 3 * 16,
+                                  .usage = rhi::BufferUsage::vertex | rhi::BufferUsage::copy_destination,
+                                  .name = "corners"});
         ASSERT_TRUE(vertices);
         constexpr std::array<std::array<float, 3>, 3> corners{{{-1, -1, 0}, {3, -1, 0}, {-1, 3, 0}}};
         for (std::uint32_t i = 0; i < 3; ++i)
@@ -324,7 +326,8 @@ void main() {
 })",
             {.stride = 16}, {{.location = 0, .format = rhi::Format::rgb32_float}});
         rhi::CommandList list = device.create_command_list("once");
-        list.begin_render_pass({.color = {{.view = rhi::TextureView{bench.target}, .load = rhi::LoadOperation::clear}}, .name = "only"});
+        list.begin_render_pass(
+            {.color = {{.view = rhi::TextureView{bench.target}, .load = rhi::LoadOperation::clear}}, .name = "only"});
         list.set_pipeline(pipeline);
         list.set_vertex_buffer(0, *vertices);
         list.draw({.vertex_count = 3});
