@@ -80,9 +80,11 @@ struct VertexBufferBinding {
     const std::byte* shadow;  ///< As Descriptor::shadow; null where the device is not in double precision.
 };
 
+inline constexpr std::uint32_t max_vertex_buffers = 32;
+
 /// What is the same for all vertices of a draw.
 struct VertexDraw {
-    VertexBufferBinding buffers[32];
+    VertexBufferBinding buffers[max_vertex_buffers];
     std::int32_t base_vertex;      ///< gl_BaseVertex
     std::uint32_t base_instance;   ///< gl_BaseInstance
     std::uint32_t draw_index;      ///< gl_DrawID

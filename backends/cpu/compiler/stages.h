@@ -47,7 +47,8 @@ class VertexEmitter final : public Emitter {
 
   private:
     std::vector<Component> input_components(const Variable& variable) override;
-    Component fetch(const rhi::VertexAttribute& attribute, std::uint32_t component, const Type& scalar);
+    Component fetch(const std::string& name, const rhi::VertexAttribute& attribute, std::uint32_t component,
+                    const Type& scalar);
     void emit_batch();
     void store_outputs();
     void add_stage_values(std::vector<llvm::Value**>& places) override;

@@ -664,7 +664,7 @@ TEST(Subgroups, HaveSixteenLanesWhereArithmeticIsConsistent) {
         layout(set = 0, binding = 1) readonly buffer Numbers { uint n[]; };
         void main() {
             uint id = n[gl_LocalInvocationIndex];
-            uint at = id * 8u;
+            uint at = id * 9u;
             result[at] = subgroupAdd(id);
             result[at + 1u] = subgroupInclusiveMul(id % 3u + 1u);
             result[at + 2u] = subgroupShuffleXor(id, 9u);
@@ -673,28 +673,32 @@ TEST(Subgroups, HaveSixteenLanesWhereArithmeticIsConsistent) {
             result[at + 5u] = gl_SubgroupSize;
             result[at + 6u] = gl_SubgroupInvocationID + 100u * gl_SubgroupID + 1000u * gl_NumSubgroups;
             if (id % 5u < 2u) result[at + 7u] = subgroupAdd(1u); else result[at + 7u] = subgroupMin(id);
+            result[at + 8u] = subgroupExclusiveAdd(id + 1u);
         }
     )";
     for (const char* spec : lane_specs) {
-        const auto words = ComputeRunner{spec, 512}.run_glsl(text);
+        const auto words = ComputeRunner{spec, 576}.run_glsl(text);
         ASSERT_TRUE(words) << words.error().message();
         for (std::uint32_t id = 0; id < 64; ++id) {
             const std::uint32_t first = id / 16 * 16;
             const auto over = [&](const std::function<void(std::uint32_t)>& visit) {
                 for (std::uint32_t i = first; i < first + 16; ++i) visit(i);
             };
-            std::uint32_t sum = 0, product = 1, ballot = 0, most = 0, few = 0, least = ~0u;
+            std::uint32_t sum = 0, product = 1, ballot = 0, most = 0, few = 0, least = ~0u, before = 0;
             over([&](std::uint32_t i) {
                 sum += i;
                 if (i <= id) product *= i % 3 + 1;
                 if (i % 3 == 0) ballot |= 1u << (i - first);
+                if (i < id) before += i + 1;
                 if (i / 8 == id / 8) most = std::max(most, i * 37 % 64);
                 if (i % 5 < 2) ++few;
                 else least = std::min(least, i);
             });
-            const std::uint32_t expected[] = {sum, product, id ^ 9, ballot, most, 16, id % 16 + 100 * (id / 16) + 4000,
-                                              id % 5 < 2 ? few : least};
-            for (std::size_t i = 0; i < 8; ++i) ASSERT_EQ((*words)[id * 8 + i], expected[i]) << spec << " invocation " << id << " value " << i;
+            const std::uint32_t expected[] = {
+                sum,   product, id ^ 9, ballot, most, 16, id % 16 + 100 * (id / 16) + 4000, id % 5 < 2 ? few : least,
+                before};
+            for (std::size_t i = 0; i < 9; ++i)
+                ASSERT_EQ((*words)[id * 9 + i], expected[i]) << spec << " invocation " << id << " value " << i;
         }
     }
 }

@@ -113,15 +113,23 @@ Expected<void> FaultBench::compute(const std::string& path, const std::string& t
     return submit(std::move(list));
 }
 
-Expected<void> FaultBench::draw(const std::string& path, const std::string& text, const std::string& vertex_text,
-                                rhi::LoadOperation load) {
+rhi::GraphicsPipeline FaultBench::make_graphics(const std::string& path, const std::string& text,
+                                                const std::string& vertex_text, const rhi::VertexBufferLayout& layout,
+                                                std::vector<rhi::VertexAttribute> attributes) {
     rhi::GraphicsPipelineDesc desc;
     desc.vertex = make_shader(vertex_text.empty() ? "whole.vert" : path + ".vert",
                               vertex_text.empty() ? whole_triangle : vertex_text);
     desc.fragment = make_shader(path, text);
+    if (!attributes.empty()) desc.vertex_buffers = {layout};
+    desc.vertex_attributes = std::move(attributes);
     desc.color_targets = {{.format = rhi::Format::rgba32_float}};
     desc.name = path;
-    const rhi::GraphicsPipeline pipeline = ok(device_->create_graphics_pipeline(desc));
+    return ok(device_->create_graphics_pipeline(desc));
+}
+
+Expected<void> FaultBench::draw(const std::string& path, const std::string& text, const std::string& vertex_text,
+                                rhi::LoadOperation load) {
+    const rhi::GraphicsPipeline pipeline = make_graphics(path, text, vertex_text);
     rhi::CommandList list = device_->create_command_list("once");
     rhi::RenderPassDesc pass;
     pass.color = {{.view = rhi::TextureView{target}, .load = load}};

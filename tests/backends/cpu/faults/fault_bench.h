@@ -29,6 +29,10 @@ class FaultBench {
                         rhi::LoadOperation load = rhi::LoadOperation::clear);
     Expected<void> submit(rhi::CommandList list);
     rhi::ComputePipeline make_compute(const std::string& path, const std::string& text);
+    /// Draws to 'target'; the vertex shader covers all of it where no text is given.
+    rhi::GraphicsPipeline make_graphics(const std::string& path, const std::string& text,
+                                        const std::string& vertex_text = {}, const rhi::VertexBufferLayout& layout = {},
+                                        std::vector<rhi::VertexAttribute> attributes = {});
     rhi::BindGroup bind(rhi::ComputePipeline pipeline);
     rhi::BindGroup bind(rhi::BindGroupLayout layout);
 
