@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <span>
 
 #include "core/embedded_file.h"
@@ -78,6 +80,73 @@ std::string table_html(const ReportTable& table) {
     return html;
 }
 
+// Place of a value on a plot's axis, [0, 1].
+double place_on(const ReportPlot& plot, double value) {
+    double place = plot.is_logarithmic ? std::log(std::max(value, 1e-300) / plot.low) / std::log(plot.high / plot.low)
+                                       : (value - plot.low) / (plot.high - plot.low);
+    if (std::isnan(place)) place = 1.0;
+    return std::clamp(place, 0.0, 1.0);
+}
+
+std::string bars_svg(const ReportPlot& plot) {
+    constexpr double left = 190.0, width = 760.0, row = 20.0;
+    const double height = row * static_cast<double>(plot.bars.size());
+    std::string svg = fmt::format("<svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\">", left + width + 20.0,
+                                  height + 26.0);
+    for (const double mark : plot.marks) {
+        const double x = left + width * place_on(plot, mark);
+        svg += fmt::format("<line class=\"axis\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"0\" y2=\"{1}\"/>"
+                           "<text class=\"axis\" x=\"{0:.1f}\" y=\"{2}\" text-anchor=\"middle\">{3:g}</text>",
+                           x, height + 4.0, height + 20.0, mark);
+    }
+    for (std::size_t i = 0; i < plot.bars.size(); ++i) {
+        const ReportPlot::Bar& bar = plot.bars[i];
+        const double from = left + width * place_on(plot, bar.low), to = left + width * place_on(plot, bar.high);
+        const double y = row * static_cast<double>(i);
+        svg += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text><rect class=\"{}\" x=\"{:.1f}\" "
+                           "y=\"{}\" width=\"{:.1f}\" height=\"12\" rx=\"2\"><title>{}: {:.6g} to {:.6g}</title></rect>",
+                           left - 10.0, y + 14.0, escaped(bar.name), class_of(bar.tone), from, y + 4.0,
+                           std::max(to - from, 2.0), escaped(bar.name), bar.low, bar.high);
+    }
+    return svg + "</svg>\n";
+}
+
+std::string lines_svg(const ReportPlot& plot) {
+    constexpr double left = 60.0, width = 700.0, height = 300.0, top = 10.0;
+    constexpr const char* colors[] = {"#7cc4ff", "#ff7b72", "#6bd68c", "#e3b341", "#d2a8ff", "#79e2d0", "#ffa657", "#f7a8c4"};
+    std::string svg = fmt::format("<svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\">", left + width + 240.0,
+                                  height + top + 30.0);
+    for (const double mark : plot.marks) {
+        const double y = top + height * (1.0 - place_on(plot, mark));
+        svg += fmt::format("<line class=\"axis\" x1=\"{0}\" x2=\"{1}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\"/>"
+                           "<text class=\"axis\" x=\"{3}\" y=\"{4:.1f}\" text-anchor=\"end\">{5:g}</text>",
+                           left, left + width, y, left - 8.0, y + 4.0, mark);
+    }
+    const auto x_of = [&](std::size_t column) {
+        return left + width * (static_cast<double>(column) + 0.5) / static_cast<double>(plot.columns.size());
+    };
+    for (std::size_t c = 0; c < plot.columns.size(); ++c)
+        svg += fmt::format("<text class=\"axis\" x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{}</text>", x_of(c),
+                           top + height + 20.0, escaped(plot.columns[c]));
+    for (std::size_t l = 0; l < plot.lines.size(); ++l) {
+        const char* const color = colors[l % std::size(colors)];
+        std::string points;
+        for (std::size_t c = 0; c < plot.lines[l].values.size(); ++c)
+            points += fmt::format("{:.1f},{:.1f} ", x_of(c), top + height * (1.0 - place_on(plot, plot.lines[l].values[c])));
+        svg += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"/><text x=\"{}\" "
+                           "y=\"{}\" style=\"fill:{}\">{}</text>",
+                           points, color, left + width + 12.0, top + 14.0 + 18.0 * static_cast<double>(l), color,
+                           escaped(plot.lines[l].name));
+    }
+    return svg + "</svg>\n";
+}
+
+std::string plot_html(const ReportPlot& plot) {
+    std::string html = fmt::format("<h2>{}</h2>", escaped(plot.title));
+    if (!plot.note.empty()) html += fmt::format("<p class=\"note\">{}</p>", escaped(plot.note));
+    return html + (plot.bars.empty() ? lines_svg(plot) : bars_svg(plot));
+}
+
 Expected<std::string> pictures_html(const std::vector<ReportPicture>& pictures, const ImageBytes& first) {
     std::string html = "<div class=\"gallery\">\n";
     for (const ReportPicture& picture : pictures) {
@@ -119,6 +188,7 @@ Expected<std::string> report_page_html(const ReportPage& page) {
         html += fmt::format("<p class=\"verdict {}\">{}</p>\n", class_of(page.tone), escaped(page.verdict));
     }
     for (const ReportTable& table : page.tables) html += table_html(table);
+    for (const ReportPlot& plot : page.plots) html += plot_html(plot);
     const ImageBytes none;
     const ImageBytes& first = page.pictures.empty() ? none : page.pictures[0].picture;
     if (!page.pictures.empty()) {

@@ -49,6 +49,27 @@ struct ReportGallery {
     std::vector<ReportPicture> pictures;
 };
 
+/// A drawing of figures on a linear or logarithmic axis; stands between tables and pictures.
+struct ReportPlot {
+    struct Bar {
+        std::string name;
+        double low = 0.0, high = 0.0;
+        ReportTone tone = ReportTone::plain;
+    };
+    struct Line {
+        std::string name;
+        std::vector<double> values;  ///< One for each of `columns`.
+    };
+    std::string title;
+    std::string note;
+    double low = 0.0, high = 1.0;      ///< Ends of the axis; what is beyond is drawn at the end.
+    bool is_logarithmic = false;       ///< Then both are above 0.
+    std::vector<double> marks;         ///< Where the axis has a line and a number.
+    std::vector<Bar> bars;             ///< One below the other, from low to high: or
+    std::vector<std::string> columns;  ///< lines over these.
+    std::vector<Line> lines;
+};
+
 struct ReportPage {
     std::string title;
     std::string subtitle;
@@ -56,6 +77,7 @@ struct ReportPage {
     ReportTone tone = ReportTone::plain; ///< Of the verdict.
     std::string verdict;                 ///< One sentence; empty: none.
     std::vector<ReportTable> tables;     ///< Before the pictures.
+    std::vector<ReportPlot> plots;       ///< After the tables.
     std::vector<ReportPicture> pictures; ///< Side by side, and in the viewer.
     std::vector<ReportGallery> galleries;///< Further pictures; also in the viewer where they have the size of the first.
     std::vector<ReportTable> details;    ///< After the pictures.

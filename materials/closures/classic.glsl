@@ -7,13 +7,19 @@
 // that are measured (docs/materials.md). Roughness is perceptual; alpha is its square. Diffuse lobes include the cosine
 // of light.
 
+float disney_scatter(float f90, float cos_theta) {
+    float m = 1.0 - cos_theta;
+    return schlick_rest(cos_theta, m) + f90 * power5(m);
+}
+
 // Source: Burley 2012 and Lagarde and de Rousiers 2014, "Moving Frostbite to physically based rendering".
 float disney_diffuse(vec3 view, vec3 light, float roughness) {
     if (light.z <= 0.0) return 0.0;
     float half_cosine = half_vector_cosine(view, light);
-    float rise = 0.5 * roughness + 2.0 * half_cosine * half_cosine * roughness - 1.0;
-    float light_scatter = 1.0 + rise * power5(1.0 - min(light.z, 1.0));
-    float view_scatter = 1.0 + rise * power5(1.0 - min(view.z, 1.0));
+    // As published 1 + (f90 - 1) (1 - c)^5, which cancels along smooth surfaces.
+    float f90 = 0.5 * roughness + 2.0 * half_cosine * half_cosine * roughness;
+    float light_scatter = disney_scatter(f90, min(light.z, 1.0));
+    float view_scatter = disney_scatter(f90, min(view.z, 1.0));
     return light_scatter * view_scatter * mix(1.0, 1.0 / 1.51, roughness) * light.z / pi;
 }
 
@@ -34,22 +40,23 @@ float neubelt_visibility(float view_cosine, float light_cosine) {
     return 1.0 / max(4.0 * (light_cosine + view_cosine - light_cosine * view_cosine), 1e-7);
 }
 
-// Distributions of fibers that stand on a surface, by the cosine of the half vector to the normal; 1 / pi included.
+// Distributions of fibers that stand on a surface, by the half vector; 1 / pi included. Its tangential part has the
+// digits that 1 - cos^2 loses.
 
 // Source: Ashikhmin and Premoze 2007, "Distribution-based BRDFs".
-float ashikhmin_distribution(float normal_half, float alpha) {
+float ashikhmin_distribution(vec3 h, float alpha) {
     float a2 = max(alpha * alpha, 1e-8);
-    float cos2 = normal_half * normal_half;
-    float sin2 = max(1.0 - cos2, 1e-6);
+    float cos2 = h.z * h.z;
+    float sin2 = max(h.x * h.x + h.y * h.y, 1e-6);
     float sin4 = sin2 * sin2;
     return (4.0 * exp(-cos2 / (sin2 * a2)) + sin4) / (pi * (1.0 + 4.0 * a2) * sin4);
 }
 
 // Source: Estevez and Kulla 2017, "Production friendly microfacet sheen BRDF". Below a roughness of 0.1 it reflects
 // more than it gets with most visibilities.
-float charlie_distribution(float normal_half, float roughness) {
+float charlie_distribution(vec3 h, float roughness) {
     float exponent = 1.0 / clamp(roughness, 0.01, 1.0);
-    float sin2 = clamp(1.0 - normal_half * normal_half, 1e-9, 1.0);
+    float sin2 = clamp(h.x * h.x + h.y * h.y, 1e-9, 1.0);
     return (2.0 + exponent) * pow(sin2, 0.5 * exponent) / (2.0 * pi);
 }
 

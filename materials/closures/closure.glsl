@@ -294,7 +294,8 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 #ifdef NACRE_SLAB_MEDIUM
     sum += closure.transmission_probability;
 #endif
-    float scale = sum > 0.0 ? 1.0 / sum : 0.0;
+    // One over less would be infinite.
+    float scale = sum > 1e-30 ? 1.0 / sum : 0.0;
     closure.specular_probability *= scale;
     closure.diffuse_probability *= scale;
 #ifdef NACRE_SLAB_SECOND_LOBE
@@ -483,8 +484,12 @@ vec3 closure_throughput(Closure closure) {
 // Coverage of a slab seen from a cosine to its normal.
 float slab_coverage(Slab slab, float cos_theta) {
     if ((slab.features & slab_edge_coverage) == 0u) return slab.coverage;
-    float m = 1.0 - saturated(cos_theta);
-    return mix(slab.coverage, slab.edge_coverage, m > 0.0 ? pow(m, slab.edge_exponent) : 0.0);
+    // (1 - c)^exponent and what is left of 1: near the surface that is small, and may be all there is.
+    float steps = slab.edge_exponent * minus_log_rest(saturated(cos_theta));
+    float rest = exponential_rest(steps);
+    // Both make 1: a coverage above 1 would leave less than nothing beside it.
+    float left = steps < 0.01 ? 1.0 - rest : exp(-steps);
+    return min(slab.coverage * rest + slab.edge_coverage * left, 1.0);
 }
 #endif
 

@@ -31,9 +31,6 @@ Fresnel make_fresnel(vec3 f0, vec3 f90, vec3 f82) {
     return fresnel;
 }
 
-// 1 - (1 - c)^5, without the loss of digits near 0.
-float schlick_rest(float c, float m) { return c * (1.0 + m * (1.0 + m * (1.0 + m * (1.0 + m)))); }
-
 vec3 fresnel_reflectance(Fresnel fresnel, float cos_theta) {
     float c = saturated(cos_theta);
     float m = 1.0 - c;

@@ -17,13 +17,18 @@ struct Haze {
 // move with haziness: the reflectance rises by what the haze adds around it.
 Haze make_haze(float f0, float roughness, float haziness, float extent) {
     float widening = 1.0 + max(extent, 0.0);
-    float alpha = min(roughness * roughness * widening, 1.0);
-    // Ratio of the peaks of the two lobes.
-    float peak = alpha > 1e-8 ? square(roughness * roughness / alpha) : 1.0 / square(widening);
+    float narrow = roughness * roughness;
+    bool is_limited = narrow * widening > 1.0;
+    float alpha = min(narrow * widening, 1.0);
+    // Ratio of both widths and 1 less that: of the peaks it is the square.
+    float ratio = is_limited ? narrow : 1.0 / widening;
+    float ratio_rest = is_limited ? 1.0 - narrow : max(extent, 0.0) / widening;
+    float peak = square(ratio);
+    float peak_rest = ratio_rest * (1.0 + ratio);
     // As much as keeps the reflectance of the whole, or the share of the second lobe, below 1.
-    float added = saturated(haziness) * (f0 > peak ? (1.0 - f0) / (1.0 - peak) : f0 / peak);
+    float added = saturated(haziness) * (f0 > peak ? (1.0 - f0) / peak_rest : f0 / peak);
     Haze haze;
-    haze.f0 = min(f0 + (1.0 - peak) * added, 1.0);
+    haze.f0 = min(f0 + peak_rest * added, 1.0);
     haze.second_roughness = sqrt(alpha);
     haze.second_weight = haze.f0 > 0.0 ? saturated(added / haze.f0) : 0.0;
     return haze;

@@ -13,6 +13,17 @@ float square(float x) { return x * x; }
 float power5(float x) { return square(square(x)) * x; }
 float power6(float x) { return square(square(x) * x); }
 
+// 1 - (1 - c)^5 by c and m = 1 - c, without the loss of digits near 0.
+float schlick_rest(float c, float m) { return c * (1.0 + m * (1.0 + m * (1.0 + m * (1.0 + m)))); }
+
+// 1 - exp(-x), with all digits where x is small.
+float exponential_rest(float x) { return x < 0.01 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x); }
+
+// -log(1 - x) for x in [0, 1], with all digits where x is small; finite at 1.
+float minus_log_rest(float x) {
+    return x < 0.05 ? x * (1.0 + x * (0.5 + x * (1.0 / 3.0 + x * (0.25 + x * 0.2)))) : -log(max(1.0 - x, 1e-37));
+}
+
 float largest(vec3 v) { return max(v.x, max(v.y, v.z)); }
 float saturated(float x) { return clamp(x, 0.0, 1.0); }
 

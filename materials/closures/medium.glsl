@@ -30,10 +30,10 @@ float medium_albedo(float similarity) {
     return (1.0 - similarity) * (1.0 - 0.139 * similarity) / (1.0 + 1.17 * similarity);
 }
 
-// Albedo of a single scattering.
-float scattering_albedo(float similarity, float phase_anisotropy) {
-    float s2 = similarity * similarity;
-    return (1.0 - s2) / (1.0 - phase_anisotropy * s2);
+// Albedo of a single scattering, by 1 - similarity: so a small one has its digits.
+float scattering_albedo(float dissimilarity, float phase_anisotropy) {
+    float single = dissimilarity * (2.0 - dissimilarity);
+    return single / (1.0 - phase_anisotropy * (1.0 - single));
 }
 
 // Mean free path in a medium that lets `transmittance` through `distance`, both in any range; and back.
@@ -49,9 +49,6 @@ float optical_depth(float mean_free_path, float distance) {
 float medium_transmittance(float mean_free_path, float distance) {
     return exp(-optical_depth(mean_free_path, distance));
 }
-
-// 1 - exp(-x), with all digits where x is small.
-float interacting(float x) { return x < 0.01 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x); }
 
 // What becomes of light that enters the layer.
 struct Scattering {
@@ -78,9 +75,10 @@ Scattering medium_scattering(float albedo, float depth, float phase_anisotropy, 
     float slice = sqrt(similarity);
     vec2 entry = medium_table(vec3(column, row, slice));
     vec2 infinite = medium_table(vec3(column, 1.0, slice));
-    float hit = interacting(reduced / max(cosine, smallest_cosine));
+    float hit = exponential_rest(reduced / max(cosine, smallest_cosine));
     // Deeper than the table, what comes through falls with the depth.
-    float back = 1.0 - max(1.0 - entry.x, 0.0) * min(4096.0 / max(reduced, 1e-6), 1.0);
+    float forth = max(1.0 - entry.x, 0.0) * min(4096.0 / max(reduced, 1e-6), 1.0);
+    float back = 1.0 - forth;
     float escaping = hit * single * entry.y;
     result.opaque = hit * hit * saturated(2.0 * back - 1.0);
     // An infinitely thick medium reflects its albedo towards every angle, as an opaque one does.
@@ -91,8 +89,8 @@ Scattering medium_scattering(float albedo, float depth, float phase_anisotropy, 
     float inside = max(cosine, smallest_cosine);
     float forward = depth * phase_anisotropy * single * inverse / inside;
     result.straight = exp(-depth / inside);
-    float through = escaping * (1.0 - back) + (forward > 0.0 ? exp(-reduced / inside) * interacting(forward)
-                                                             : -result.straight * interacting(-forward));
+    float through = escaping * forth + (forward > 0.0 ? exp(-reduced / inside) * exponential_rest(forward)
+                                                             : -result.straight * exponential_rest(-forward));
     result.through = max(through, 0.0);
     result.straight = max(result.straight + min(through, 0.0), 0.0);
     return result;

@@ -25,22 +25,37 @@ vec3 film_interference(float path) {
 // Below this the film fades: two orders of interference do not add up to the interface without it.
 const float thinnest_film = 3e-8;
 
+// Reflectance and 1 - reflectance, each with its digits where it is small.
+struct FilmShares {
+    vec3 reflected;
+    vec3 passed;
+};
+
 // 1 - reflectance, all orders of the incoherent sum and two of the interference: the series of Airy with both summed
 // up. Nothing cancels where the lower side reflects everything. `through` is 1 - outer.
-float film_channel(float outer, float through, float inner, float inner_rest, float first_order, float second_order) {
+float film_passed(float outer, float through, float inner, float inner_rest, float first_order, float second_order) {
     float amplitude = sqrt(outer * inner);
     float passed = through * inner_rest / max(1.0 - outer * inner, 1e-6);
     return passed * (1.0 + 2.0 * amplitude * (first_order + amplitude * second_order));
 }
 
-// 1 - reflectance of the interface under a film, by the cosine to its normal. thickness: meters.
-vec3 film_transmittance(vec3 f0, float thickness, float film_ior, float cos_theta) {
+// The same for the reflectance: what cancels are numbers of its own size, where neither side reflects much. (Where
+// both reflect nearly everything its digits are lost.)
+float film_reflected(float outer, float through, float inner, float inner_rest, float first_order,
+                     float second_order) {
+    float amplitude = sqrt(outer * inner);
+    float interfering = 2.0 * through * inner_rest * amplitude * (first_order + amplitude * second_order);
+    return (outer * inner_rest + inner * through - interfering) / max(1.0 - outer * inner, 1e-6);
+}
+
+// Of the interface under a film, by the cosine to its normal. thickness: meters.
+FilmShares film_shares(vec3 f0, float thickness, float film_ior, float cos_theta) {
     float c = saturated(cos_theta);
     float ior = max(film_ior, 1.0);
     float outer_f0 = ior_to_reflectance(ior);
     float inside = refracted_cosine(c, outer_f0);
     float through = (1.0 - outer_f0) * schlick_rest(c, 1.0 - c);
-    float outer = 1.0 - through;
+    float outer = outer_f0 * schlick_rest(c, 1.0 - c) + power5(1.0 - c);
     float path = 2.0 * ior * thickness * inside;
     vec3 order_1 = film_interference(path);
     vec3 order_2 = film_interference(2.0 * path);
@@ -50,17 +65,21 @@ vec3 film_transmittance(vec3 f0, float thickness, float film_ior, float cos_thet
                       mix(reflectance_under(f0.y, ior), 1.0, saturated(f0.y * 50.0 - 49.0)),
                       mix(reflectance_under(f0.z, ior), 1.0, saturated(f0.z * 50.0 - 49.0)));
     vec3 rest = (vec3(1.0) - below) * inside_rest;
+    vec3 inner = below * inside_rest + vec3(power5(1.0 - inside));
     // A reflection off a denser medium turns the phase by half a wave, off the film's upper side and, where what is
     // below is denser than the film, off its lower side: then both orders add up without a path.
-    vec3 film =
-        vec3(film_channel(outer, through, 1.0 - rest.x, rest.x, f0.x < outer_f0 ? order_1.x : -order_1.x, order_2.x),
-             film_channel(outer, through, 1.0 - rest.y, rest.y, f0.y < outer_f0 ? order_1.y : -order_1.y, order_2.y),
-             film_channel(outer, through, 1.0 - rest.z, rest.z, f0.z < outer_f0 ? order_1.z : -order_1.z, order_2.z));
-    return clamp(film, vec3(0.0), vec3(1.0));
-}
-
-vec3 film_reflectance(vec3 f0, float thickness, float film_ior, float cos_theta) {
-    return vec3(1.0) - film_transmittance(f0, thickness, film_ior, cos_theta);
+    vec3 first = vec3(f0.x < outer_f0 ? order_1.x : -order_1.x, f0.y < outer_f0 ? order_1.y : -order_1.y,
+                      f0.z < outer_f0 ? order_1.z : -order_1.z);
+    vec3 passed = vec3(film_passed(outer, through, inner.x, rest.x, first.x, order_2.x),
+                       film_passed(outer, through, inner.y, rest.y, first.y, order_2.y),
+                       film_passed(outer, through, inner.z, rest.z, first.z, order_2.z));
+    vec3 reflected = vec3(film_reflected(outer, through, inner.x, rest.x, first.x, order_2.x),
+                          film_reflected(outer, through, inner.y, rest.y, first.y, order_2.y),
+                          film_reflected(outer, through, inner.z, rest.z, first.z, order_2.z));
+    FilmShares shares;
+    shares.passed = clamp(passed, vec3(0.0), vec3(1.0));
+    shares.reflected = clamp(reflected, vec3(0.0), vec3(1.0));
+    return shares;
 }
 
 // The interface with its film as a Schlick curve that passes through the film's reflectance at one cosine: so the
@@ -69,11 +88,14 @@ Fresnel make_film_fresnel(Fresnel bare, float thickness, float film_ior, float c
     // Along the surface all curves meet, and the fit would divide by nothing.
     float c = clamp(cos_theta, 0.1, 1.0);
     float m5 = power5(1.0 - c);
-    vec3 missing = film_transmittance(bare.normal, thickness, film_ior, c);
+    FilmShares film = film_shares(bare.normal, thickness, film_ior, c);
     Fresnel fresnel = bare;
     fresnel.grazing = max(bare.grazing, vec3(saturated(ior_to_reflectance(max(film_ior, 1.0)) / smallest_reflectance)));
-    vec3 normal = vec3(1.0) - clamp((missing - (vec3(1.0) - fresnel.grazing) * m5) / schlick_rest(c, 1.0 - c),
-                                    vec3(0.0), vec3(1.0));
+    float rest = schlick_rest(c, 1.0 - c);
+    vec3 bright = vec3(1.0) - clamp((film.passed - (vec3(1.0) - fresnel.grazing) * m5) / rest, vec3(0.0), vec3(1.0));
+    vec3 dark = clamp((film.reflected - fresnel.grazing * m5) / rest, vec3(0.0), vec3(1.0));
+    vec3 normal = vec3(film.passed.x < 0.5 ? bright.x : dark.x, film.passed.y < 0.5 ? bright.y : dark.y,
+                       film.passed.z < 0.5 ? bright.z : dark.z);
     float share = smoothstep(0.0, thinnest_film, thickness);
     fresnel.normal = mix(bare.normal, normal, share);
     fresnel.grazing = mix(bare.grazing, fresnel.grazing, share);

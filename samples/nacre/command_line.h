@@ -74,6 +74,14 @@ struct MaterialArguments {
     std::string json;
 };
 
+struct StabilityArguments {
+    std::vector<std::string> backends;     ///< Empty: those of cpu, vulkan and gl that work.
+    std::uint64_t points = 100'000'000;
+    std::string only;                      ///< Part of closures' names; empty: all.
+    std::string output;                    ///< Folder; empty: no files.
+    std::string json;
+};
+
 struct DemoArguments {
     SceneArguments scene;
     std::string output = "out/demo";
@@ -90,7 +98,7 @@ struct CompletionArguments {
 };
 
 using Invocation = std::variant<DevicesArguments, RenderArguments, CompareArguments, DiffArguments, ExplainArguments,
-                                MaterialArguments, DemoArguments, CacheArguments, CompletionArguments>;
+                                MaterialArguments, StabilityArguments, DemoArguments, CacheArguments, CompletionArguments>;
 
 /// An invocation, or the exit code where everything is said already (help, version, wrong usage).
 std::variant<Invocation, int> parse_command_line(int argc, const char* const* argv);

@@ -15,6 +15,7 @@ Outcome run(const CompareArguments& arguments);
 Outcome run(const DiffArguments& arguments);
 Outcome run(const ExplainArguments& arguments);
 Outcome run(const MaterialArguments& arguments);
+Outcome run(const StabilityArguments& arguments);
 Outcome run(const DemoArguments& arguments);
 Outcome run(const CacheArguments& arguments);
 Outcome run(const CompletionArguments& arguments);

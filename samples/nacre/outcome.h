@@ -13,7 +13,7 @@ enum class ExitCode : int {
     success = 0,         ///< Done; for comparisons: within the tolerance.
     failure = 1,         ///< Something could not be done: a file, a device, a driver.
     usage = 2,           ///< The command line is wrong.
-    over_tolerance = 3,  ///< A comparison ran, and the difference is too large.
+    over_tolerance = 3,  ///< A comparison or measurement ran, and is beyond what is allowed.
 };
 
 /// Why a subcommand stopped. Made from any `Error`, which then counts as a failure.

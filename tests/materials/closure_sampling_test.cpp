@@ -7,6 +7,7 @@
 
 #include <cstdlib>
 
+#include "measure/chi_square.h"
 #include "tests/materials/closure_points.h"
 
 namespace nacre::materials::test {
@@ -23,138 +24,23 @@ long sample_count(long in_suite) {
     return text ? std::max(std::atol(text), 1000l) : in_suite;
 }
 
-/// Upper tail of the chi-square distribution. Source: Wilson and Hilferty 1931, good for the tails of many degrees.
-double chi_square_tail(double statistic, double degrees) {
-    const double spread = 2.0 / (9.0 * degrees);
-    const double z = (std::cbrt(statistic / degrees) - (1.0 - spread)) / std::sqrt(spread);
-    return 0.5 * std::erfc(z / std::numbers::sqrt2);
-}
-
-/// Directions in bins around an axis: rings whose angles to it grow exponentially, so that narrow lobes around the
-/// mirrored view get as many bins as wide ones.
-struct Bins {
-    int rings, sectors;
-    glm::dvec3 axis, right, up;
-    double smallest;  // angle of the first ring
-
-    Bins(int rings_, const glm::dvec3& axis_, double smallest_)
-        : rings(rings_), sectors(2 * rings_), axis(axis_), smallest(smallest_) {
-        const glm::dvec3 helper = std::abs(axis.z) < 0.9 ? glm::dvec3(0.0, 0.0, 1.0) : glm::dvec3(1.0, 0.0, 0.0);
-        right = glm::normalize(glm::cross(helper, axis));
-        up = glm::cross(axis, right);
-    }
-    [[nodiscard]] double angle_at(double ring) const {
-        return std::numbers::pi * std::expm1(ring / rings * std::log1p(1.0 / smallest)) * smallest;
-    }
-    [[nodiscard]] int bin_of(const glm::dvec3& w) const {
-        // The angle from the chord: the cosine loses the digits of small angles.
-        const double angle = 2.0 * std::asin(std::min(0.5 * glm::length(w - axis), 1.0));
-        const double ring = std::log1p(angle / (std::numbers::pi * smallest)) / std::log1p(1.0 / smallest) * rings;
-        double phi = std::atan2(glm::dot(w, up), glm::dot(w, right));
-        if (phi < 0.0) phi += 2.0 * std::numbers::pi;
-        return std::clamp(static_cast<int>(ring), 0, rings - 1) * sectors +
-               std::clamp(static_cast<int>(phi / (2.0 * std::numbers::pi) * sectors), 0, sectors - 1);
-    }
-    [[nodiscard]] glm::dvec3 direction_at(double ring, double sector) const {
-        const double angle = angle_at(ring), phi = 2.0 * std::numbers::pi * sector / sectors;
-        return std::sin(angle) * (std::cos(phi) * right + std::sin(phi) * up) + std::cos(angle) * axis;
-    }
-    /// Integral of the density over a part of a bin, halving it until its midpoints agree.
-    template <typename Density>
-    double integral(const Density& density, double ring, double sector, double ring_size, double sector_size,
-                    int depth) const {
-        const auto sum = [&](int count) {
-            double result = 0.0;
-            for (int i = 0; i < count; ++i) {
-                const double low = ring + ring_size * i / count, high = ring + ring_size * (i + 1) / count;
-                // 1 - cos by half angles.
-                const double area =
-                    2.0 *
-                    (std::pow(std::sin(0.5 * angle_at(high)), 2.0) - std::pow(std::sin(0.5 * angle_at(low)), 2.0)) *
-                    2.0 * std::numbers::pi * sector_size / count / sectors;
-                for (int j = 0; j < count; ++j)
-                    result += area * density(direction_at(ring + ring_size * (i + 0.5) / count,
-                                                          sector + sector_size * (j + 0.5) / count));
-            }
-            return result;
-        };
-        double lowest = 1.0, highest = -1.0;
-        for (int corner = 0; corner < 5; ++corner) {
-            const double z =
-                corner == 4 ? direction_at(ring + 0.5 * ring_size, sector + 0.5 * sector_size).z
-                            : direction_at(ring + ring_size * (corner & 1), sector + sector_size * (corner >> 1)).z;
-            lowest = std::min(lowest, z);
-            highest = std::max(highest, z);
-        }
-        // Densities end at the surface, and some lobes lie along it: midpoints may all miss that.
-        const bool is_at_surface = lowest < 0.1 && highest > 0.0 && highest - lowest > 0.02 * highest;
-        const double coarse = sum(2), fine = sum(4);
-        const bool is_fine_enough =
-            std::abs(coarse - fine) < (is_full_test() ? 2e-5 * fine + 1e-12 : 1e-3 * fine + 1e-9);
-        if (depth == 0 || (!(is_at_surface && depth > (is_full_test() ? 7 : 6)) && is_fine_enough))
-            return fine + (fine - coarse) / 3.0;
-        double result = 0.0;
-        for (int i = 0; i < 2; ++i)
-            for (int j = 0; j < 2; ++j)
-                result += integral(density, ring + 0.5 * i * ring_size, sector + 0.5 * j * sector_size, 0.5 * ring_size,
-                                   0.5 * sector_size, depth - 1);
-        return result;
-    }
-};
-
-/// Smallest probability, over several sizes of bins, that honest samples look as unlike the density as these.
-/// `scale`: what the density is wrong by.
+/// Smallest probability that honest samples look as unlike the density as these. `scale`: what the density is wrong by.
 double smallest_probability(Library& library, const Library::Closure& closure, double narrowest, long samples,
                             std::uint64_t seed, double scale = 1.0) {
     const glm::dvec3 view = closure.view;
-    const Bins bins(is_full_test() ? 80 : 40, {-view.x, -view.y, view.z}, std::clamp(narrowest, 1e-5, 1.0));
-    const auto density = [&](const glm::dvec3& w) { return scale * library.closure_pdf(closure, w); };
-    std::vector<double> expected(bins.rings * bins.sectors), observed(expected.size());
-    double total = 0.0;
-    for (int ring = 0; ring < bins.rings; ++ring)
-        for (int sector = 0; sector < bins.sectors; ++sector)
-            total += expected[ring * bins.sectors + sector] =
-                samples * std::max(bins.integral(density, ring, sector, 1.0, 1.0, is_full_test() ? 13 : 10), 0.0);
+    measure::ChiSquareTest test({.rings = is_full_test() ? 80 : 40,
+                                 .axis = {-view.x, -view.y, view.z},
+                                 .smallest_angle = std::clamp(narrowest, 1e-5, 1.0),
+                                 .tolerance = is_full_test() ? 2e-5 : 1e-3,
+                                 .subdivisions = is_full_test() ? 13 : 10},
+                                [&](const glm::dvec3& w) { return library.closure_pdf(closure, w); });
     Random random(seed);
-    double kept = 0.0;
     for (long i = 0; i < samples; ++i) {
         const auto sample = library.sample_closure(closure, {random(), random(), random()});
-        if (sample.pdf <= 0.0 || sample.is_mirror) continue;
-        observed[bins.bin_of(sample.direction)] += 1.0;
-        kept += 1.0;
+        if (sample.pdf <= 0.0 || sample.is_mirror) test.add_lost();
+        else test.add(sample.direction);
     }
-    double smallest = 1.0;
-    for (const int merged : {1, 4, 8, bins.rings}) {
-        double statistic = 0.0, degrees = 0.0, rest_expected = 0.0, rest_observed = 0.0;
-        for (int ring = 0; ring < bins.rings; ring += merged) {
-            for (int sector = 0; sector < bins.sectors; sector += merged) {
-                double e = 0.0, o = 0.0;
-                for (int i = 0; i < merged; ++i) {
-                    for (int j = 0; j < merged; ++j) {
-                        e += expected[(ring + i) * bins.sectors + sector + j];
-                        o += observed[(ring + i) * bins.sectors + sector + j];
-                    }
-                }
-                rest_expected += e;
-                rest_observed += o;
-                if (rest_expected < 5.0) continue;  // bins of few samples are pooled
-                statistic += (rest_observed - rest_expected) * (rest_observed - rest_expected) / rest_expected;
-                degrees += 1.0;
-                rest_expected = rest_observed = 0.0;
-            }
-        }
-        // What goes below the surface or into a mirror is one more bin; where nothing does, the total is no freedom.
-        const double lost = samples - total, lost_observed = samples - kept;
-        if (lost > 5.0) {
-            statistic += (lost_observed - lost) * (lost_observed - lost) / lost;
-        } else if (std::abs(lost_observed - lost) > 5.0 + 2e-4 * samples) {
-            return 0.0;
-        } else {
-            degrees -= 1.0;
-        }
-        if (degrees > 0.0) smallest = std::min(smallest, chi_square_tail(statistic, degrees));
-    }
-    return smallest;
+    return test.smallest_probability(scale);
 }
 
 struct Case {

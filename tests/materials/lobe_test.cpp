@@ -166,7 +166,7 @@ TEST(Lobes, ThinFilmIsTheSpectrumOfAirysSeries) {
         for (const double ior : {1.3, 1.8}) {
             for (const double thickness : {1e-7, 3e-7, 6e-7, 1e-6}) {
                 for (const double cosine : {1.0, 0.7, 0.3}) {
-                    const glm::dvec3 film = library.film_reflectance(glm::dvec3(f0), thickness, ior, cosine);
+                    const glm::dvec3 film = library.film_shares(glm::dvec3(f0), thickness, ior, cosine).reflected;
                     const glm::dvec3 exact = glm::clamp(spectral_film(library, f0, thickness, ior, cosine), 0.0, 1.0);
                     for (int channel = 0; channel < 3; ++channel)
                         largest = std::max(largest, std::abs(film[channel] - exact[channel]));
@@ -185,7 +185,7 @@ TEST(Lobes, AFilmFadesInAndItsCurvePassesThroughItsReflectance) {
     EXPECT_NEAR(glm::distance(library.make_film_fresnel(bare, 0.0, 1.5, 0.6).normal, bare.normal), 0.0, 1e-12);
     for (const double cosine : {1.0, 0.8, 0.5}) {
         const auto fresnel = library.make_film_fresnel(bare, 4e-7, 1.5, cosine);
-        const glm::dvec3 film = library.film_reflectance(bare.normal, 4e-7, 1.5, cosine);
+        const glm::dvec3 film = library.film_shares(bare.normal, 4e-7, 1.5, cosine).reflected;
         EXPECT_NEAR(glm::distance(library.fresnel_reflectance(fresnel, cosine), film), 0.0, 1e-9);
     }
 }

@@ -14,7 +14,7 @@ TEST(Medium, AlbedoInversionGoesThereAndBack) {
         EXPECT_NEAR(library.medium_albedo(similarity), albedo, 2e-5);
         EXPECT_NEAR(1.0 - library.medium_dissimilarity(albedo), similarity, 1e-6);
         for (const double g : {-0.9, 0.0, 0.9}) {
-            const double single = library.scattering_albedo(similarity, g);
+            const double single = library.scattering_albedo(1.0 - similarity, g);
             EXPECT_GE(single, 0.0);
             EXPECT_LE(single, 1.0);
             EXPECT_NEAR(std::sqrt((1.0 - single) / (1.0 - single * g)), similarity, 1e-9);

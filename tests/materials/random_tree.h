@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <random>
+#include "measure/random_tree.h"
 
-#include "materials/tree.h"
+/// @file
+/// The trees of measure/random_tree.h by the names that the tests of materials use.
 
 namespace nacre::materials {
 
-/// What random trees are made of.
-struct RandomTreeDesc {
-    std::uint32_t slabs = 4;
-    std::uint32_t features = 0;  ///< Of which each slab has some.
-    bool is_lossless = false;    ///< White albedo, no tint and no absorption anywhere; everything below is opaque.
-};
-
-/// A valid tree of any topology that the operators can make of so many slabs; the same for the same state of `random`
-/// on all machines. Layers have a medium on top where `features` has one.
-[[nodiscard]] Tree random_tree(std::mt19937& random, const RandomTreeDesc& desc);
+using measure::random_tree;
+using measure::RandomTreeDesc;
 
 }  // namespace nacre::materials

@@ -86,6 +86,11 @@ INSTANTIATE_TEST_SUITE_P(
         WrongLine{{"compare", "builtin:spheres", "--backends", "gl,vulkan", "--tolerance", "/nonexistent.json"},
                   "/nonexistent.json"},
         WrongLine{{"diff", "a.png"}, "B is required"}, WrongLine{{"explain"}, "SCENE is required"},
+        WrongLine{{"stability", "--points", "0"}, "'0' is not a whole number"},
+        WrongLine{{"stability", "--points", "nan"}, "'nan'"}, WrongLine{{"stability", "--points", "1e5"}, "'1e5'"},
+        WrongLine{{"stability", "--backends", "cpu,"}, "one or more"},
+        WrongLine{{"stability", "--backends", "abacus", "--points", "1000"}, "'abacus'"},
+        WrongLine{{"stability", "--spread"}, "--spread"}, WrongLine{{"stability", "--only", "glitter"}, "'glitter'"},
         WrongLine{{"cache", "burn"}, "burn"}, WrongLine{{"demo", "--frames", "none"}, "'none'"}));
 
 TEST(CommandLineTest, MissingFilesAreFailures) {
@@ -96,6 +101,9 @@ TEST(CommandLineTest, MissingFilesAreFailures) {
         run_nacre({"render", "builtin:spheres", "-o", "/tmp/a.png", "--env", "/nonexistent/sky.hdr"});
     EXPECT_EQ(environment.exit_code, 1);
     EXPECT_THAT(environment.errors, HasSubstr("/nonexistent/sky.hdr"));
+    const CommandResult folder = run_nacre({"stability", "--points", "1000", "-o", "/dev/null/stability"});
+    EXPECT_EQ(folder.exit_code, 1);
+    EXPECT_THAT(folder.errors, HasSubstr("'/dev/null/stability'"));
     EXPECT_EQ(run_nacre({"diff", "/nonexistent/a.png", "/nonexistent/b.png"}).exit_code, 1);
 }
 

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/materials/random_tree.h"
+#include "measure/random_tree.h"
 
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 #include <limits>
 
-namespace nacre::materials {
+namespace nacre::measure {
 namespace {
+
+using namespace materials;
 
 // Distributions of the standard library differ from one library to the next; this does not.
 float uniform(std::mt19937& random) { return static_cast<float>(random() >> 8) * 0x1p-24f; }
@@ -86,4 +88,4 @@ Tree random_tree(std::mt19937& random, const RandomTreeDesc& desc) {
     return tree;
 }
 
-}  // namespace nacre::materials
+}  // namespace nacre::measure

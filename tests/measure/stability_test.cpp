@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sweep of all closures, as long as CI has time for, and whether it finds what it is for.
+#include "measure/stability.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "measure/chi_square.h"
+#include "measure/closure_points.h"
+#include "measure/point_shader.h"
+#include "measure/stability_subject.h"
+#include "samples/backends.h"
+
+namespace nacre::measure {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// The part of the full sweep (nacre stability) that a minute is enough for.
+TEST(Stability, ClosuresKeepTheirPromises) {
+    const rhi::Instance instance(all_backends());
+    const auto report = measure_stability(instance, {.backends = {"cpu"}, .points = 300'000});
+    ASSERT_TRUE(report) << report.error().message();
+    EXPECT_GE(report->closures.size(), 35u);
+    for (const std::string& violation : violations_of(*report)) ADD_FAILURE() << violation;
+    std::uint64_t points = 0;
+    for (const StabilityClosure& c : report->closures) {
+        points += c.all.points;
+        EXPECT_GT(c.all.points, 1000u) << c.name;
+        EXPECT_LT(c.all.host_error, 1e-5) << c.name << ": the reference is wrong at " << c.all.host_at;
+        // Single scattering is reciprocal.
+        if (c.name == "lobe-ggx" || c.name == "lobe-chan" || c.name == "classic-disney" ||
+            c.name == "classic-charlie") {
+            EXPECT_LT(c.all.reciprocity, 1e-4) << c.name << ": " << c.all.reciprocity_at;
+        }
+        if (c.name == "lobe-ggx") {
+            EXPECT_LE(c.all.weight_max, 1.0 + 1e-5);
+        }
+        if (c.name == "trees-lossless") {
+            EXPECT_GE(c.furnace_min, 0.98);
+        }
+    }
+    EXPECT_GE(points, 300'000u);
+    const nlohmann::json json = nlohmann::json::parse(to_json(*report));
+    ASSERT_EQ(json["closures"].size(), report->closures.size());
+    for (const nlohmann::json& closure : json["closures"]) {
+        for (const char* key : {"name", "points", "nan", "inf", "negative", "max_rel_error", "at", "furnace_min",
+                                "furnace_max", "reciprocity", "chi2_failures", "weight_max", "weight_variance"})
+            EXPECT_TRUE(closure.contains(key)) << key;
+    }
+    const auto html = report_page_html(stability_page(*report));
+    ASSERT_TRUE(html) << html.error().message();
+    EXPECT_THAT(*html, HasSubstr("<svg"));
+    EXPECT_THAT(*html, testing::Not(HasSubstr("src=\"http")));
+}
+
+TEST(Stability, WhatIsBrokenIsNamed) {
+    StabilityReport report;
+    report.closures.push_back({.name = "good"});
+    EXPECT_TRUE(violations_of(report).empty());
+    StabilityClosure bad{.name = "bad"};
+    bad.all.nan = 3;
+    bad.all.max_rel_error = 0.1;
+    bad.all.agreement = 1e-3;
+    bad.chi2_tests = 2;
+    bad.chi2_failures = 1;
+    report.closures.push_back(bad);
+    EXPECT_THAT(violations_of(report),
+                ElementsAre(HasSubstr("3 results are not a number"), HasSubstr("error of 0.1"), HasSubstr("0.001"),
+                            HasSubstr("1 of 2 samplers")));
+    // JSON knows no infinity.
+    report.closures[1].all.max_rel_error = INFINITY;
+    EXPECT_GT(nlohmann::json::parse(to_json(report))["closures"][1]["max_rel_error"], 1e300);
+}
+
+// The distribution as textbooks have it cancels for smooth surfaces: the sweep's own points and judgement must see that
+// on the device where they do not see it of the closures.
+TEST(Stability, FindsTheTextbookDistribution) {
+    const rhi::Instance instance(all_backends());
+    const auto device = instance.create_device({.backend = "cpu"});
+    ASSERT_TRUE(device) << device.error().message();
+    auto subjects = lobe_subjects();
+    const auto found = std::ranges::find(subjects, "lobe-ggx", &StabilitySubject::name);
+    ASSERT_NE(found, subjects.end());
+    StabilitySubject textbook = *found;
+    const auto replace = [](std::string& text, const std::string& from, const std::string& to) {
+        const std::size_t at = text.find(from);
+        ASSERT_NE(at, std::string::npos);
+        text.replace(at, from.size(), to);
+    };
+    replace(textbook.shader.text, "put(p.at, value);",
+            "float a2 = alpha.x * alpha.x;\n"
+            "    float d = (a2 - 1.0) * h.z * h.z + 1.0;\n"
+            "    put(p.at, a2 / (pi * d * d));");
+    const auto own = measure_subject(**device, **instance.create_device({.backend = "cpu:double"}), *found, 30000, 7);
+    const auto figures =
+        measure_subject(**device, **instance.create_device({.backend = "cpu:double"}), textbook, 30000, 7);
+    ASSERT_TRUE(own) << own.error().message();
+    ASSERT_TRUE(figures) << figures.error().message();
+    EXPECT_LT(own->max_rel_error, 1e-5);
+    EXPECT_GT(figures->max_rel_error, 0.1);
+    EXPECT_THAT(figures->at, HasSubstr("roughness"));
+}
+
+TEST(Stability, TooFewPointsAndUnknownNamesAreErrors) {
+    const rhi::Instance instance(all_backends());
+    const auto none = measure_stability(instance, {.points = 0});
+    ASSERT_FALSE(none);
+    EXPECT_THAT(none.error().message(), HasSubstr("0 points"));
+    const auto nothing = measure_stability(instance, {.points = 1000, .only = "glitter"});
+    ASSERT_FALSE(nothing);
+    EXPECT_THAT(nothing.error().message(), HasSubstr("'glitter'"));
+    EXPECT_FALSE(measure_stability(instance, {.backends = {"abacus"}, .points = 1000}));
+}
+
+// Samples of a cosine lobe pass against its own density, and not against one that is wrong by 1 %, nor against another.
+TEST(ChiSquareTest, TellsOnePercent) {
+    const auto cosine = [](const glm::dvec3& w) { return std::max(w.z, 0.0) / std::numbers::pi; };
+    const DirectionBins bins{.rings = 40, .smallest_angle = 0.5, .tolerance = 1e-4, .subdivisions = 10};
+    ChiSquareTest test(bins, cosine);
+    ChiSquareTest other(bins, [](const glm::dvec3& w) { return w.z > 0.0 ? 0.5 / std::numbers::pi : 0.0; });
+    Random random(3);
+    for (int i = 0; i < 1'000'000; ++i) {
+        const glm::dvec3 sample = direction(std::sqrt(random()), 2.0 * std::numbers::pi * random());
+        test.add(sample);
+        other.add(sample);
+    }
+    EXPECT_GT(test.smallest_probability(), 1e-3);
+    EXPECT_LT(test.smallest_probability(1.01), 1e-9);
+    EXPECT_LT(test.smallest_probability(0.99), 1e-9);
+    EXPECT_LT(other.smallest_probability(), 1e-9);
+}
+
+}  // namespace
+}  // namespace nacre::measure
