@@ -26,6 +26,9 @@ struct MathOptions {
     /// The target converts between half and single precision by instructions (F16C, AVX-512, NEON). Results are the
     /// same bits.
     bool half_instructions = false;
+    /// The target takes numbers apart and scales them by powers of two by instructions (AVX-512 F and VL): less code for
+    /// exponentials and logarithms. Results are as accurate, but differ in how they are rounded where they are denormal.
+    bool exponent_instructions = false;
 };
 
 /// Emits functions of one or many values.
