@@ -187,7 +187,8 @@ struct TileRun {
                     if (is_loaded)
                         store_pixels(target.texel_bytes, to, target.row_stride, area, targets.streams_colors);
                     else
-                        fill_texels(target.clear, target.texel_bytes, to, target.row_stride, area.width, area.height);
+                        fill_texels(target.clear, target.texel_bytes, to, target.row_stride, area.width, area.height,
+                                    targets.streams_colors);
                 }
                 if (is_whole) break;
             }
@@ -205,13 +206,13 @@ struct TileRun {
                              plane_area(memory.depth, sample), false);
             else if (depth_clears)
                 fill_texels(&targets.clear_depth, depth_bytes(), depth_texels(sample), targets.depth_row_stride, width,
-                            height);
+                            height, false);
             if (stencil_changed || (stencil_clears && stencil_loaded))
                 store_pixels(1, stencil_texels(sample), targets.stencil_row_stride, plane_area(memory.stencil, sample),
                              false);
             else if (stencil_clears)
                 fill_texels(&targets.clear_stencil, 1, stencil_texels(sample), targets.stencil_row_stride, width,
-                            height);
+                            height, false);
         }
     }
 
