@@ -288,17 +288,21 @@ NACRE_INLINE void load_two_raw(const Source& source, const Place<W>& first, cons
 /// @param texels  left and right of the upper row, then of the lower one
 NACRE_INLINE bool load_near_footprints(const Source& source, Ints<16> x, Ints<16> y, Ints<16> slice,
                                        Floats<16> (&texels)[4][4]) {
-    // What a lane lies before the first one is where the window begins.
+    constexpr std::int32_t window_width = 4;
+    if (source.width < window_width) return false;
+    // The window begins where the lane before the first one does that lies farthest from it, inside of the level.
     const std::int32_t first_x = x[0], first_y = y[0], first_slice = slice[0];
     const auto any = [](Ints<16> lanes) { return mask_bits<16>(lanes) != 0 ? 1 : 0; };
-    const std::int32_t left = first_x - any(x < first_x) - any(x < first_x - 1), top = first_y - any(y < first_y);
+    const std::int32_t leftmost = first_x - any(x < first_x) - any(x < first_x - 1), top = first_y - any(y < first_y);
+    const std::int32_t left = leftmost < source.width - window_width ? leftmost : source.width - window_width;
     const Ints<16> column = x - left, row = y - top;
     if (any(((Uints<16>)column > 2u) | ((Uints<16>)row > 1u) | (slice != first_slice)) != 0) return false;
     const std::byte* const begin = source.base + static_cast<std::uint64_t>(first_slice) * source.slice_stride +
                                    static_cast<std::ptrdiff_t>(left) * 8;
-    // What lies beyond the end of a row is loaded, but nobody's; blocks of memory can be read behind their end.
+    // Nobody takes anything from a row behind the last.
     const auto load = [&](std::int32_t number) {
-        const auto* from = begin + static_cast<std::ptrdiff_t>(number < source.height ? number : source.height - 1) * source.row_stride;
+        const std::int32_t row_loaded = number < source.height ? number : source.height - 1;
+        const std::byte* const from = begin + static_cast<std::ptrdiff_t>(row_loaded) * source.row_stride;
         return _mm512_maskz_cvtph_ps(0xffff, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
     };
     const __m512 rows[3] = {load(top), load(top + 1), load(top + 2)};
