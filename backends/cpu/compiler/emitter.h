@@ -140,7 +140,8 @@ class SlotTable {
 
 class Emitter {
   public:
-    Emitter(llvm::Module& target, const Module& module, const CompilerOptions& options, std::span<const BindingSlots> slots);
+    Emitter(llvm::Module& target, const Module& module, const CompilerOptions& options, const MathOptions& math_options,
+            std::span<const BindingSlots> slots);
     virtual ~Emitter() = default;
     /// Set before the emission of a program that tells what it computes, and filled by it.
     TraceTable* trace_table = nullptr;

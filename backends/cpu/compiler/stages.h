@@ -38,9 +38,9 @@ class ComputeEmitter final : public Emitter {
 
 class VertexEmitter final : public Emitter {
   public:
-    VertexEmitter(llvm::Module& into, const Module& from, const CompilerOptions& how, std::span<const BindingSlots> layout,
-                  const VertexInput& input)
-        : Emitter(into, from, how, layout), input_(input) {}
+    VertexEmitter(llvm::Module& into, const Module& from, const CompilerOptions& how, const MathOptions& how_math,
+                  std::span<const BindingSlots> layout, const VertexInput& input)
+        : Emitter(into, from, how, how_math, layout), input_(input) {}
     void emit();
     VertexProgram program;  ///< Everything but `run`, `name` and `code`.
     using Emitter::has_side_effects;
