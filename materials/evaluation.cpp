@@ -87,7 +87,7 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
                 paths[step.result] = library.path_through_mix(paths[step.a], amount);
                 break;
             case StepKind::path_through_layer:
-                paths[step.result] = library.path_through_layer(paths[step.a], matters[step.b], matters[step.c].albedo);
+                paths[step.result] = library.path_through_layer(paths[step.a], matters[step.b], matters[step.c]);
                 break;
         }
     }

@@ -213,7 +213,7 @@ class Printer {
                     print("    Path path_{} = path_through_mix(path_{}, {});\n", step.result, step.a, amount);
                     break;
                 case StepKind::path_through_layer:
-                    print("    Path path_{} = path_through_layer(path_{}, matter_{}, matter_{}.albedo);\n", step.result,
+                    print("    Path path_{} = path_through_layer(path_{}, matter_{}, matter_{});\n", step.result,
                           step.a, step.b, step.c);
                     break;
             }

@@ -34,7 +34,6 @@
 //     vec3 closure_throughput(Closure closure)                        of the view: through fuzz, interface and medium
 //     float slab_coverage(Slab slab, float cos_theta)                 where a slab may have slab_edge_coverage
 //     vec3 internal_reflectance(Slab slab)                            K, of diffuse light from the medium's side
-//     vec3 bounce_factor(vec3 internal, vec3 base_albedo)             (1 - K) / (1 - E_b K)
 //
 // Who includes this provides the tables (materials/closures/tables.glsl, medium.glsl) and, where a slab may have
 // slab_specular_lut, vec3 specular_lut(uint index, vec2 at): the tint by the cosines of view and light to the normal.
@@ -497,14 +496,6 @@ vec3 internal_reflectance(Slab slab) {
     vec3 mean = fresnel_mean(fresnel);
     return vec3(internal_reflectance_of(slab.f0.x, mean.x), internal_reflectance_of(slab.f0.y, mean.y),
                 internal_reflectance_of(slab.f0.z, mean.z));
-}
-
-// What a diffuse base of albedo base_albedo under an interface sends out, relative to its first bounce: the light that
-// the interface throws back hits the base again, and again. Source: OpenPBR, "Coat darkening".
-vec3 bounce_factor(vec3 internal, vec3 base_albedo) {
-    vec3 passed = vec3(1.0) - internal;
-    // Written so that nothing is lost where both are 1.
-    return (passed + vec3(1e-9)) / (passed + internal * (vec3(1.0) - base_albedo) + vec3(1e-9));
 }
 
 #endif

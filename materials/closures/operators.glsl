@@ -39,15 +39,19 @@ struct Spread {
     float variance;  // that the covered share adds to the slopes of what lies below
 };
 
-// A slab, or what stands for a subtree, as what lies below it sees it. The last five are those of the covered share;
-// where nothing is covered they mean nothing.
+// A slab, or what stands for a subtree, as what lies below and above it sees it. All but coverage are those of the
+// covered share; where nothing is covered they mean nothing.
 struct Matter {
     float coverage;
-    vec3 transmittance;       // straight through the medium along the normal
+    vec3 transmittance;       // of light along the normal that is not scattered back: what the medium leaves of it
     vec3 view_transmittance;  // of what is seen through it in the view direction: interface, fuzz and medium
     vec3 internal;            // reflectance for diffuse light from below
-    vec3 albedo;              // reflectance for diffuse light from above
-    vec3 passed;              // of diffuse light from above, what reaches the other side
+    vec3 leaving;             // of diffuse light from below, what leaves; 1 - internal where nothing is absorbed
+    vec3 sharp_internal;      // the same two for light that comes from below about along the mirrored view
+    vec3 sharp_leaving;
+    vec3 albedo;   // reflectance for diffuse light from above
+    vec3 passed;   // of diffuse light from above, what reaches the other side
+    vec3 diffuse;  // share of what is reflected towards the view that comes as diffuse light does, not mirrored
 };
 
 // How a slab is seen through all that lies above it.
@@ -107,8 +111,12 @@ Matter no_matter() {
     m.transmittance = vec3(1.0);
     m.view_transmittance = vec3(1.0);
     m.internal = vec3(0.0);
+    m.leaving = vec3(1.0);
+    m.sharp_internal = vec3(0.0);
+    m.sharp_leaving = vec3(1.0);
     m.albedo = vec3(0.0);
     m.passed = vec3(1.0);
+    m.diffuse = vec3(1.0);
     return m;
 }
 
@@ -120,12 +128,30 @@ Path open_path() {
     return path;
 }
 
+// How much of a mirroring lobe that reflects the view inside a medium of index 1.5 meets the medium's surface as diffuse
+// light does: 0 a mirror's, 1 diffuse light. A fit of what GGX lobes of that alpha lose to total reflection there, off by
+// 0.1 (and by less where that is seen: towards grazing views both ends are alike).
+float lobe_diffuseness(float alpha, float cos_view) { return 1.0 - exp(-7.0 * pow(alpha, 0.3 + 1.5 * cos_view)); }
+
+// Light from below between the medium and the interface above it: what comes back down, and what leaves.
+vec3 thrown_back(vec3 interface_reflectance, vec3 reflected, vec3 through) {
+    return min(reflected + through * through * interface_reflectance /
+                               max(vec3(1.0) - interface_reflectance * reflected, vec3(1e-6)),
+               vec3(1.0));
+}
+vec3 leaving(vec3 interface_reflectance, vec3 reflected) {
+    return (vec3(1.0) - reflected) * (vec3(1.0) - interface_reflectance) /
+           max(vec3(1.0) - interface_reflectance * reflected, vec3(1e-6));
+}
+
 // What a layer above a slab needs to know of it: the albedo is that under diffuse light.
 Matter base_matter(Slab slab, float cos_view) {
     Matter m = no_matter();
     m.coverage = slab_coverage(slab, cos_view);
     vec3 reflected = slab.albedo;
     vec3 through = vec3(0.0);
+    vec3 scattered = vec3(1.0);
+    m.transmittance = vec3(0.0);
 #ifdef NACRE_SLAB_MEDIUM
     if ((slab.features & slab_medium) != 0u) {
         float inside = refracted_cosine(mean_cosine, dot(slab.f0, vec3(1.0 / 3.0)));
@@ -136,12 +162,25 @@ Matter base_matter(Slab slab, float cos_view) {
         Scattering z = medium_scattering(slab.albedo.z, optical_depth(slab.mean_free_path.z, slab.thickness),
                                          slab.phase_anisotropy, inside);
         reflected = vec3(x.reflected, y.reflected, z.reflected);
-        through = vec3(x.through + x.straight, y.through + y.straight, z.through + z.straight);
+        scattered = vec3(x.through, y.through, z.through);
+        through = scattered + vec3(x.straight, y.straight, z.straight);
+        scattered = scattered / max(through, vec3(1e-30));
+        m.transmittance = exp(log(clamp(through / max(vec3(1.0) - reflected, vec3(1e-6)), vec3(1e-30), vec3(1.0))) * inside);
     }
 #endif
-    vec3 mean = fresnel_mean(slab_fresnel(slab));
+    Fresnel fresnel = slab_fresnel(slab);
+    vec3 mean = fresnel_mean(fresnel);
     m.albedo = mean + (vec3(1.0) - mean) * reflected;
     m.passed = (vec3(1.0) - mean) * through;
+    vec3 mirrored = mean * (1.0 - lobe_diffuseness(slab.roughness * slab.roughness, cos_view));
+    m.diffuse = vec3(1.0) - mirrored / max(m.albedo, vec3(1e-30));
+    vec3 from_below = internal_reflectance(slab);
+    // Light that was scattered on its way in is diffuse when it comes back.
+    vec3 sharp = mix(fresnel_reflectance(fresnel, cos_view), from_below, scattered);
+    m.internal = thrown_back(from_below, reflected, through);
+    m.leaving = leaving(from_below, reflected);
+    m.sharp_internal = thrown_back(sharp, reflected, through);
+    m.sharp_leaving = leaving(sharp, reflected);
 #ifdef NACRE_SLAB_FUZZ
     if ((slab.features & slab_fuzz) != 0u) {
         float fuzz = slab.fuzz_amount * sheen_albedo(mean_cosine, slab.fuzz_roughness);
@@ -155,10 +194,23 @@ Matter base_matter(Slab slab, float cos_view) {
 // A slab as what lies below and around it sees it.
 Matter slab_matter(Slab slab, Closure closure) {
     Matter m = base_matter(slab, closure.view.z);
-    m.transmittance = closure_transmittance(closure, 1.0);
     m.view_transmittance = closure_throughput(closure) + closure_albedo(closure).transmission;
-    m.internal = internal_reflectance(slab);
     return m;
+}
+
+// What a base under a layer sends out, relative to its first reflection: the layer throws light back to the base, again
+// and again. What the base mirrors the first time is less spread than what it reflects later. Source for diffuse light:
+// OpenPBR, "Coat darkening".
+vec3 bounce_factor(Matter top, Matter base) {
+    vec3 first = base.diffuse;
+    vec3 later = vec3(1.0) - (vec3(1.0) - first) * (vec3(1.0) - first);
+    vec3 internal = mix(top.sharp_internal, top.internal, later);
+    vec3 leaving = mix(top.sharp_leaving, top.leaving, later);
+    // 1 - internal * albedo by positive terms: nothing is lost where both are 1.
+    vec3 left = leaving + max(vec3(1.0) - internal - leaving, vec3(0.0)) + internal * (vec3(1.0) - base.albedo);
+    vec3 again = (leaving + vec3(1e-9)) / (left + vec3(1e-9));
+    return mix(top.sharp_leaving, top.leaving, first) +
+           mix(top.sharp_internal, top.internal, first) * base.albedo * again;
 }
 
 // Of what lies below, seen through matter that covers only a part.
@@ -182,8 +234,13 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     m.transmittance = mix(a.transmittance, b.transmittance, share);
     m.view_transmittance = mix(a.view_transmittance, b.view_transmittance, share);
     m.internal = mix(a.internal, b.internal, share);
+    m.leaving = mix(a.leaving, b.leaving, share);
+    m.sharp_internal = mix(a.sharp_internal, b.sharp_internal, share);
+    m.sharp_leaving = mix(a.sharp_leaving, b.sharp_leaving, share);
     m.albedo = mix(a.albedo, b.albedo, share);
     m.passed = mix(a.passed, b.passed, share);
+    m.diffuse = (covered_a * a.albedo * a.diffuse + covered_b * b.albedo * b.diffuse + vec3(1e-30)) /
+                (covered_a * a.albedo + covered_b * b.albedo + vec3(1e-30));
     return m;
 }
 
@@ -204,13 +261,21 @@ Matter layer_matter(Matter top, Matter base) {
         tb * top.view_transmittance * base.view_transmittance;
     // Light goes on between the top, from below, and the base, from above.
     vec3 between = vec3(1.0) / max(vec3(1.0) - base.albedo * top.internal, vec3(1e-6));
-    vec3 internal =
-        base.internal + (vec3(1.0) - base.internal) * base.transmittance * top.internal * base.passed * between;
-    vec3 albedo = top.albedo + top.passed * base.albedo * bounce_factor(top.internal, base.albedo) * top.transmittance;
+    vec3 sharply = vec3(1.0) / max(vec3(1.0) - base.albedo * top.sharp_internal, vec3(1e-6));
+    vec3 internal = base.internal + base.leaving * base.transmittance * top.internal * base.passed * between;
+    vec3 sharp_internal =
+        base.sharp_internal + base.sharp_leaving * base.transmittance * top.sharp_internal * base.passed * sharply;
+    vec3 below = top.passed * base.albedo * bounce_factor(top, base) * top.transmittance;
     vec3 passed = top.passed * base.passed * between;
     m.internal = t * top.internal + b * base.internal + tb * min(internal, vec3(1.0));
-    m.albedo = t * top.albedo + b * base.albedo + tb * min(albedo, vec3(1.0));
+    m.leaving = t * top.leaving + b * base.leaving + tb * min(base.leaving * top.leaving * between, vec3(1.0));
+    m.sharp_internal = t * top.sharp_internal + b * base.sharp_internal + tb * min(sharp_internal, vec3(1.0));
+    m.sharp_leaving = t * top.sharp_leaving + b * base.sharp_leaving +
+                      tb * min(base.sharp_leaving * top.sharp_leaving * sharply, vec3(1.0));
+    m.albedo = t * top.albedo + b * base.albedo + tb * min(top.albedo + below, vec3(1.0));
     m.passed = t * top.passed + b * base.passed + tb * min(passed, vec3(1.0));
+    m.diffuse = ((t + tb) * top.albedo * top.diffuse + (b * base.albedo + tb * below) * base.diffuse + vec3(1e-30)) /
+                ((t + tb) * top.albedo + b * base.albedo + tb * below + vec3(1e-30));
     return m;
 }
 
@@ -221,11 +286,11 @@ Path path_through_mix(Path path, float amount) {
     return above;
 }
 
-// A path that comes up from the base of a layer under `top`; `base_albedo` is that of all that lies below the top, to
-// the bottom of the material (Matter::albedo): light that is thrown back may hit any part of it.
-Path path_through_layer(Path path, Matter top, vec3 base_albedo) {
+// A path that comes up from the base of a layer under `top`; `base` is all that lies below the top, to the bottom of the
+// material: light that is thrown back may hit any part of it.
+Path path_through_layer(Path path, Matter top, Matter base) {
     vec3 beside = vec3(1.0 - top.coverage);
-    vec3 through = top.coverage * top.view_transmittance * bounce_factor(top.internal, base_albedo);
+    vec3 through = top.coverage * top.view_transmittance * bounce_factor(top, base);
     vec3 sum = beside + through;
     // Where nothing comes through the rest does not matter.
     vec3 by = beside / max(sum, vec3(1e-30));
