@@ -182,6 +182,52 @@ Fresnel slab_fresnel(Slab slab) {
     return make_fresnel(slab.f0, f90, f82);
 }
 
+// Of diffuse light that hits the interface from the medium's side: what leaves through a denser medium's surface is
+// what enters it, spread over index^2 times the angle.
+float internal_reflectance_of(float f0, float mean) { return 1.0 - (1.0 - mean) / square(reflectance_to_ior(f0)); }
+
+vec3 internal_reflectance(Slab slab) {
+    Fresnel fresnel = make_fresnel(slab.f0, vec3(1.0), vec3(1.0));
+    vec3 mean = fresnel_mean(fresnel);
+    return vec3(internal_reflectance_of(slab.f0.x, mean.x), internal_reflectance_of(slab.f0.y, mean.y),
+                internal_reflectance_of(slab.f0.z, mean.z));
+}
+
+#ifdef NACRE_SLAB_MEDIUM
+// Of diffuse light, about half way between its mean cosine and its most frequent one.
+const float mean_cosine = 0.6;
+
+// What becomes of light inside the slab, for each channel.
+struct MediumScattering {
+    vec3 reflected;  // back to the interface
+    vec3 through;    // scattered, out of the far side
+    vec3 straight;   // out of the far side without an event
+    vec3 opaque;
+};
+
+// The medium's own albedo: what is authored has the interface's part in it, which throws light back into the medium.
+float albedo_of_medium(float albedo, float internal) {
+    return albedo / max((1.0 - internal) + internal * albedo, 1e-30);
+}
+
+// cosine: inside the medium.
+MediumScattering slab_scattering(Slab slab, float cosine) {
+    vec3 internal = internal_reflectance(slab);
+    Scattering x = medium_scattering(albedo_of_medium(slab.albedo.x, internal.x),
+                                     optical_depth(slab.mean_free_path.x, slab.thickness), slab.phase_anisotropy, cosine);
+    Scattering y = medium_scattering(albedo_of_medium(slab.albedo.y, internal.y),
+                                     optical_depth(slab.mean_free_path.y, slab.thickness), slab.phase_anisotropy, cosine);
+    Scattering z = medium_scattering(albedo_of_medium(slab.albedo.z, internal.z),
+                                     optical_depth(slab.mean_free_path.z, slab.thickness), slab.phase_anisotropy, cosine);
+    MediumScattering medium;
+    medium.reflected = vec3(x.reflected, y.reflected, z.reflected);
+    medium.through = vec3(x.through, y.through, z.through);
+    medium.straight = vec3(x.straight, y.straight, z.straight);
+    medium.opaque = vec3(x.opaque, y.opaque, z.opaque);
+    return medium;
+}
+#endif
+
 Closure prepare_closure(Slab slab, vec3 view, float footprint) {
     Closure closure;
     closure.features = slab.features;
@@ -266,19 +312,21 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
                              optical_depth(slab.mean_free_path.y, slab.thickness),
                              optical_depth(slab.mean_free_path.z, slab.thickness));
         float inside = refracted_cosine(closure.view.z, closure.reflectance);
-        Scattering x = medium_scattering(slab.albedo.x, closure.depth.x, slab.phase_anisotropy, inside);
-        Scattering y = medium_scattering(slab.albedo.y, closure.depth.y, slab.phase_anisotropy, inside);
-        Scattering z = medium_scattering(slab.albedo.z, closure.depth.z, slab.phase_anisotropy, inside);
-        vec3 opaque = vec3(x.opaque, y.opaque, z.opaque);
+        vec3 internal = internal_reflectance(slab);
+        MediumScattering medium = slab_scattering(slab, inside);
+        MediumScattering again = slab_scattering(slab, mean_cosine);
+        // What is scattered back meets the interface from below, and some of it comes again as diffuse light.
+        vec3 upwards = medium.reflected / max(vec3(1.0) - internal * again.reflected, vec3(1e-6));
         vec3 share = vec3(subsurface_share(slab.albedo.x, slab.mean_free_path.x, footprint),
                           subsurface_share(slab.albedo.y, slab.mean_free_path.y, footprint),
                           subsurface_share(slab.albedo.z, slab.mean_free_path.z, footprint));
-        diffuse = entering * vec3(x.reflected, y.reflected, z.reflected);
-        closure.thin = diffuse * (vec3(1.0) - opaque);
-        closure.subsurface = diffuse * opaque * share;
-        closure.diffuse = diffuse * opaque * (vec3(1.0) - share);
-        closure.transmission = entering * vec3(x.through, y.through, z.through);
-        closure.straight = entering * vec3(x.straight, y.straight, z.straight);
+        diffuse = entering * min(upwards * (vec3(1.0) - internal), vec3(1.0));
+        closure.thin = diffuse * (vec3(1.0) - medium.opaque);
+        closure.subsurface = diffuse * medium.opaque * share;
+        closure.diffuse = diffuse * medium.opaque * (vec3(1.0) - share);
+        closure.transmission =
+            entering * (medium.through + internal * upwards * (again.through + again.straight));
+        closure.straight = entering * medium.straight;
         closure.transmission_probability = largest(closure.transmission);
     }
 #endif
@@ -486,16 +534,5 @@ float slab_coverage(Slab slab, float cos_theta) {
     return mix(slab.coverage, slab.edge_coverage, m > 0.0 ? pow(m, slab.edge_exponent) : 0.0);
 }
 #endif
-
-// Of diffuse light that hits the interface from the medium's side: what leaves through a denser medium's surface is
-// what enters it, spread over index^2 times the angle.
-float internal_reflectance_of(float f0, float mean) { return 1.0 - (1.0 - mean) / square(reflectance_to_ior(f0)); }
-
-vec3 internal_reflectance(Slab slab) {
-    Fresnel fresnel = make_fresnel(slab.f0, vec3(1.0), vec3(1.0));
-    vec3 mean = fresnel_mean(fresnel);
-    return vec3(internal_reflectance_of(slab.f0.x, mean.x), internal_reflectance_of(slab.f0.y, mean.y),
-                internal_reflectance_of(slab.f0.z, mean.z));
-}
 
 #endif

@@ -39,19 +39,27 @@ struct Spread {
     float variance;  // that the covered share adds to the slopes of what lies below
 };
 
+// What a layer does with light from below: what it throws back, and what leaves it. The two make 1 where nothing is
+// absorbed; what the medium takes of light that leaves is not in it, but in Matter::transmittance.
+struct Underside {
+    vec3 back;
+    vec3 leaving;
+};
+
 // A slab, or what stands for a subtree, as what lies below and above it sees it. All but coverage are those of the
 // covered share; where nothing is covered they mean nothing.
 struct Matter {
     float coverage;
     vec3 transmittance;       // of light along the normal that is not scattered back: what the medium leaves of it
     vec3 view_transmittance;  // of what is seen through it in the view direction: interface, fuzz and medium
-    vec3 internal;            // reflectance for diffuse light from below
-    vec3 leaving;             // of diffuse light from below, what leaves; 1 - internal where nothing is absorbed
-    vec3 sharp_internal;      // the same two for light that comes from below about along the mirrored view
-    vec3 sharp_leaving;
-    vec3 albedo;   // reflectance for diffuse light from above
-    vec3 passed;   // of diffuse light from above, what reaches the other side
-    vec3 diffuse;  // share of what is reflected towards the view that comes as diffuse light does, not mirrored
+    Underside diffuse;        // for diffuse light from below
+    Underside mirrored;       // for light that comes about along the mirrored view
+    Underside trapped;        // for light that comes at the angles at which it was totally reflected before
+    vec3 albedo;              // reflectance for diffuse light from above
+    vec3 passed;              // of diffuse light from above, what reaches the other side
+    vec3 gloss;               // share of what is reflected towards the view that a lobe mirrors
+    float alpha2;             // squared GGX alpha of that lobe
+    float cos_view;
 };
 
 // How a slab is seen through all that lies above it.
@@ -102,22 +110,28 @@ Slab track_slab(Slab slab, float variance) {
     return tracked;
 }
 
-// Of diffuse light, about half way between its mean cosine and its most frequent one.
-const float mean_cosine = 0.6;
-
 Matter no_matter() {
     Matter m;
     m.coverage = 0.0;
     m.transmittance = vec3(1.0);
     m.view_transmittance = vec3(1.0);
-    m.internal = vec3(0.0);
-    m.leaving = vec3(1.0);
-    m.sharp_internal = vec3(0.0);
-    m.sharp_leaving = vec3(1.0);
+    m.diffuse.back = vec3(0.0);
+    m.diffuse.leaving = vec3(1.0);
+    m.mirrored = m.diffuse;
+    m.trapped = m.diffuse;
     m.albedo = vec3(0.0);
     m.passed = vec3(1.0);
-    m.diffuse = vec3(1.0);
+    m.gloss = vec3(0.0);
+    m.alpha2 = 0.0;
+    m.cos_view = 1.0;
     return m;
+}
+
+Underside mix_underside(Underside a, Underside b, vec3 share) {
+    Underside u;
+    u.back = mix(a.back, b.back, share);
+    u.leaving = mix(a.leaving, b.leaving, share);
+    return u;
 }
 
 Path open_path() {
@@ -128,59 +142,53 @@ Path open_path() {
     return path;
 }
 
-// How much of a mirroring lobe that reflects the view inside a medium of index 1.5 meets the medium's surface as diffuse
-// light does: 0 a mirror's, 1 diffuse light. A fit of what GGX lobes of that alpha lose to total reflection there, off by
-// 0.1 (and by less where that is seen: towards grazing views both ends are alike).
-float lobe_diffuseness(float alpha, float cos_view) { return 1.0 - exp(-7.0 * pow(alpha, 0.3 + 1.5 * cos_view)); }
-
-// Light from below between the medium and the interface above it: what comes back down, and what leaves.
-vec3 thrown_back(vec3 interface_reflectance, vec3 reflected, vec3 through) {
-    return min(reflected + through * through * interface_reflectance /
-                               max(vec3(1.0) - interface_reflectance * reflected, vec3(1e-6)),
-               vec3(1.0));
-}
-vec3 leaving(vec3 interface_reflectance, vec3 reflected) {
-    return (vec3(1.0) - reflected) * (vec3(1.0) - interface_reflectance) /
-           max(vec3(1.0) - interface_reflectance * reflected, vec3(1e-6));
+// A medium that lets `through` pass of diffuse light and reflects `reflected`, under an interface.
+Underside underside_of(vec3 interface_reflectance, vec3 reflected, vec3 through) {
+    vec3 between = vec3(1.0) / max(vec3(1.0) - interface_reflectance * reflected, vec3(1e-6));
+    Underside u;
+    u.back = min(reflected + through * through * interface_reflectance * between, vec3(1.0));
+    u.leaving = (vec3(1.0) - reflected) * (vec3(1.0) - interface_reflectance) * between;
+    return u;
 }
 
 // What a layer above a slab needs to know of it: the albedo is that under diffuse light.
 Matter base_matter(Slab slab, float cos_view) {
     Matter m = no_matter();
     m.coverage = slab_coverage(slab, cos_view);
+    m.cos_view = cos_view;
+    m.alpha2 = square(square(slab.roughness));
+    vec3 from_below = internal_reflectance(slab);
+    vec3 albedo = slab.albedo;
+    vec3 out_of_medium = vec3(0.0);
     vec3 reflected = slab.albedo;
     vec3 through = vec3(0.0);
     vec3 scattered = vec3(1.0);
     m.transmittance = vec3(0.0);
 #ifdef NACRE_SLAB_MEDIUM
     if ((slab.features & slab_medium) != 0u) {
-        float inside = refracted_cosine(mean_cosine, dot(slab.f0, vec3(1.0 / 3.0)));
-        Scattering x = medium_scattering(slab.albedo.x, optical_depth(slab.mean_free_path.x, slab.thickness),
-                                         slab.phase_anisotropy, inside);
-        Scattering y = medium_scattering(slab.albedo.y, optical_depth(slab.mean_free_path.y, slab.thickness),
-                                         slab.phase_anisotropy, inside);
-        Scattering z = medium_scattering(slab.albedo.z, optical_depth(slab.mean_free_path.z, slab.thickness),
-                                         slab.phase_anisotropy, inside);
-        reflected = vec3(x.reflected, y.reflected, z.reflected);
-        scattered = vec3(x.through, y.through, z.through);
-        through = scattered + vec3(x.straight, y.straight, z.straight);
-        scattered = scattered / max(through, vec3(1e-30));
-        m.transmittance = exp(log(clamp(through / max(vec3(1.0) - reflected, vec3(1e-6)), vec3(1e-30), vec3(1.0))) * inside);
+        MediumScattering medium = slab_scattering(slab, mean_cosine);
+        reflected = medium.reflected;
+        through = medium.through + medium.straight;
+        scattered = medium.through / max(through, vec3(1e-30));
+        vec3 upwards = reflected / max(vec3(1.0) - from_below * reflected, vec3(1e-6));
+        albedo = min(upwards * (vec3(1.0) - from_below), vec3(1.0));
+        out_of_medium = through * (vec3(1.0) + upwards * from_below);
+        m.transmittance = exp(log(clamp(through / max(vec3(1.0) - reflected, vec3(1e-6)), vec3(1e-30), vec3(1.0))) *
+                              mean_cosine);
     }
 #endif
     Fresnel fresnel = slab_fresnel(slab);
     vec3 mean = fresnel_mean(fresnel);
-    m.albedo = mean + (vec3(1.0) - mean) * reflected;
-    m.passed = (vec3(1.0) - mean) * through;
-    vec3 mirrored = mean * (1.0 - lobe_diffuseness(slab.roughness * slab.roughness, cos_view));
-    m.diffuse = vec3(1.0) - mirrored / max(m.albedo, vec3(1e-30));
-    vec3 from_below = internal_reflectance(slab);
+    m.albedo = mean + (vec3(1.0) - mean) * albedo;
+    m.passed = (vec3(1.0) - mean) * out_of_medium;
+    m.gloss = mean / max(m.albedo, vec3(1e-30));
+    m.diffuse = underside_of(from_below, reflected, through);
     // Light that was scattered on its way in is diffuse when it comes back.
-    vec3 sharp = mix(fresnel_reflectance(fresnel, cos_view), from_below, scattered);
-    m.internal = thrown_back(from_below, reflected, through);
-    m.leaving = leaving(from_below, reflected);
-    m.sharp_internal = thrown_back(sharp, reflected, through);
-    m.sharp_leaving = leaving(sharp, reflected);
+    m.mirrored = mix_underside(underside_of(fresnel_reflectance(fresnel, cos_view), reflected, through), m.diffuse,
+                               scattered);
+    // A fit: 0.876 at index 1.5, for lobes so narrow that they hardly let anything escape that was reflected once.
+    vec3 trapping = vec3(1.0) - exp(log(max(vec3(1.0) - from_below, vec3(1e-6))) * 2.3);
+    m.trapped = mix_underside(underside_of(trapping, reflected, through), m.diffuse, scattered);
 #ifdef NACRE_SLAB_FUZZ
     if ((slab.features & slab_fuzz) != 0u) {
         float fuzz = slab.fuzz_amount * sheen_albedo(mean_cosine, slab.fuzz_roughness);
@@ -199,18 +207,23 @@ Matter slab_matter(Slab slab, Closure closure) {
 }
 
 // What a base under a layer sends out, relative to its first reflection: the layer throws light back to the base, again
-// and again. What the base mirrors the first time is less spread than what it reflects later. Source for diffuse light:
-// OpenPBR, "Coat darkening".
+// and again. Diffuse light: (1 - K) / (1 - E K) (OpenPBR, "Coat darkening"). What a lobe mirrors meets the layer's
+// surface as the view did, K near Fresnel's reflectance, and the more as diffuse light does the wider the lobe is; what
+// was totally reflected comes back at such angles again. Both widths are fits to random walks between a GGX lobe and a
+// smooth interface of index 1.5, off by 0.1; the layer's own facets turn light half as far as those of the base.
 vec3 bounce_factor(Matter top, Matter base) {
-    vec3 first = base.diffuse;
-    vec3 later = vec3(1.0) - (vec3(1.0) - first) * (vec3(1.0) - first);
-    vec3 internal = mix(top.sharp_internal, top.internal, later);
-    vec3 leaving = mix(top.sharp_leaving, top.leaving, later);
-    // 1 - internal * albedo by positive terms: nothing is lost where both are 1.
-    vec3 left = leaving + max(vec3(1.0) - internal - leaving, vec3(0.0)) + internal * (vec3(1.0) - base.albedo);
-    vec3 again = (leaving + vec3(1e-9)) / (left + vec3(1e-9));
-    return mix(top.sharp_leaving, top.leaving, first) +
-           mix(top.sharp_internal, top.internal, first) * base.albedo * again;
+    float alpha = max(sqrt(base.alpha2 + 0.25 * top.alpha2), 1e-6);
+    float cosine = max(base.cos_view, 0.01);
+    vec3 width = vec3(1.0 - exp(-7.0 * pow(alpha, 0.3 + 1.5 * cosine)));
+    vec3 width_later = vec3(1.0 - exp(-60.0 * pow(alpha, 1.35) / pow(cosine, 1.7)));
+    vec3 narrow = vec3(exp(-alpha / 0.27));
+    Underside first = mix_underside(top.diffuse, mix_underside(top.mirrored, top.diffuse, width), base.gloss);
+    Underside returning = mix_underside(top.diffuse, top.trapped, narrow);
+    Underside later = mix_underside(top.diffuse, mix_underside(top.mirrored, returning, width_later), base.gloss);
+    // 1 - back * albedo by positive terms: nothing is lost where both are 1.
+    vec3 left = later.leaving + max(vec3(1.0) - later.back - later.leaving, vec3(0.0)) +
+                later.back * (vec3(1.0) - base.albedo);
+    return first.leaving + first.back * base.albedo * (later.leaving + vec3(1e-9)) / (left + vec3(1e-9));
 }
 
 // Of what lies below, seen through matter that covers only a part.
@@ -223,6 +236,16 @@ Matter cover_matter(Matter m, float amount) {
     return covered;
 }
 
+// Of two kinds of matter, by what each reflects.
+vec3 gloss_of_both(Matter a, vec3 reflected_a, Matter b, vec3 reflected_b) {
+    return (reflected_a * a.gloss + reflected_b * b.gloss) / max(reflected_a + reflected_b, vec3(1e-30));
+}
+float alpha2_of_both(Matter a, vec3 reflected_a, Matter b, vec3 reflected_b) {
+    float mirrored_a = largest(reflected_a * a.gloss);
+    float mirrored_b = largest(reflected_b * b.gloss);
+    return (mirrored_a * a.alpha2 + mirrored_b * b.alpha2) / max(mirrored_a + mirrored_b, 1e-30);
+}
+
 // Side by side: a on 1 - amount of the surface, b on the rest.
 Matter mix_matter(Matter a, Matter b, float amount) {
     float covered_a = (1.0 - amount) * a.coverage;
@@ -233,15 +256,25 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     float share = covered_b / m.coverage;
     m.transmittance = mix(a.transmittance, b.transmittance, share);
     m.view_transmittance = mix(a.view_transmittance, b.view_transmittance, share);
-    m.internal = mix(a.internal, b.internal, share);
-    m.leaving = mix(a.leaving, b.leaving, share);
-    m.sharp_internal = mix(a.sharp_internal, b.sharp_internal, share);
-    m.sharp_leaving = mix(a.sharp_leaving, b.sharp_leaving, share);
+    m.diffuse = mix_underside(a.diffuse, b.diffuse, vec3(share));
+    m.mirrored = mix_underside(a.mirrored, b.mirrored, vec3(share));
+    m.trapped = mix_underside(a.trapped, b.trapped, vec3(share));
     m.albedo = mix(a.albedo, b.albedo, share);
     m.passed = mix(a.passed, b.passed, share);
-    m.diffuse = (covered_a * a.albedo * a.diffuse + covered_b * b.albedo * b.diffuse + vec3(1e-30)) /
-                (covered_a * a.albedo + covered_b * b.albedo + vec3(1e-30));
+    m.gloss = gloss_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
+    m.alpha2 = alpha2_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
+    m.cos_view = a.cos_view;
     return m;
+}
+
+// The undersides of two layers, by the shares of the surface where the top, the base and both are.
+Underside layer_underside(Underside top, Underside base, Matter base_matter, float t, float b, float tb) {
+    vec3 between = vec3(1.0) / max(vec3(1.0) - base_matter.albedo * top.back, vec3(1e-6));
+    vec3 back = base.back + base.leaving * base_matter.transmittance * top.back * base_matter.passed * between;
+    Underside u;
+    u.back = t * top.back + b * base.back + tb * min(back, vec3(1.0));
+    u.leaving = t * top.leaving + b * base.leaving + tb * min(base.leaving * top.leaving * between, vec3(1.0));
+    return u;
 }
 
 // One above the other, lying independently: both on C_t C_b of the surface, either alone on the rest.
@@ -259,23 +292,19 @@ Matter layer_matter(Matter top, Matter base) {
     m.view_transmittance =
         t * top.view_transmittance + b * base.view_transmittance +
         tb * top.view_transmittance * base.view_transmittance;
-    // Light goes on between the top, from below, and the base, from above.
-    vec3 between = vec3(1.0) / max(vec3(1.0) - base.albedo * top.internal, vec3(1e-6));
-    vec3 sharply = vec3(1.0) / max(vec3(1.0) - base.albedo * top.sharp_internal, vec3(1e-6));
-    vec3 internal = base.internal + base.leaving * base.transmittance * top.internal * base.passed * between;
-    vec3 sharp_internal =
-        base.sharp_internal + base.sharp_leaving * base.transmittance * top.sharp_internal * base.passed * sharply;
     vec3 below = top.passed * base.albedo * bounce_factor(top, base) * top.transmittance;
-    vec3 passed = top.passed * base.passed * between;
-    m.internal = t * top.internal + b * base.internal + tb * min(internal, vec3(1.0));
-    m.leaving = t * top.leaving + b * base.leaving + tb * min(base.leaving * top.leaving * between, vec3(1.0));
-    m.sharp_internal = t * top.sharp_internal + b * base.sharp_internal + tb * min(sharp_internal, vec3(1.0));
-    m.sharp_leaving = t * top.sharp_leaving + b * base.sharp_leaving +
-                      tb * min(base.sharp_leaving * top.sharp_leaving * sharply, vec3(1.0));
+    // Light goes on between the top, from below, and the base, from above.
+    vec3 passed = top.passed * base.passed / max(vec3(1.0) - base.albedo * top.diffuse.back, vec3(1e-6));
+    m.diffuse = layer_underside(top.diffuse, base.diffuse, base, t, b, tb);
+    m.mirrored = layer_underside(top.mirrored, base.mirrored, base, t, b, tb);
+    m.trapped = layer_underside(top.trapped, base.trapped, base, t, b, tb);
     m.albedo = t * top.albedo + b * base.albedo + tb * min(top.albedo + below, vec3(1.0));
     m.passed = t * top.passed + b * base.passed + tb * min(passed, vec3(1.0));
-    m.diffuse = ((t + tb) * top.albedo * top.diffuse + (b * base.albedo + tb * below) * base.diffuse + vec3(1e-30)) /
-                ((t + tb) * top.albedo + b * base.albedo + tb * below + vec3(1e-30));
+    vec3 of_top = (t + tb) * top.albedo;
+    vec3 of_base = b * base.albedo + tb * below;
+    m.gloss = gloss_of_both(top, of_top, base, of_base);
+    m.alpha2 = alpha2_of_both(top, of_top, base, of_base);
+    m.cos_view = base.cos_view;
     return m;
 }
 
