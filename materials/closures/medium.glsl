@@ -85,7 +85,6 @@ Scattering medium_scattering(float albedo, float depth, float phase_anisotropy, 
     result.opaque = hit * hit * saturated(2.0 * back - 1.0);
     // An infinitely thick medium reflects its albedo towards every angle, as an opaque one does.
     float toward_albedo = mix(1.0, albedo / max(single * infinite.y, 1e-30), result.opaque);
-    result.reflected = min(escaping * back * (similarity > 0.0 ? toward_albedo : 1.0), 1.0);
     // Of the light that the isotropic medium lets through straight, this one scatters some forward; a backward phase
     // function takes some of it.
     float inside = max(cosine, smallest_cosine);
@@ -95,6 +94,10 @@ Scattering medium_scattering(float albedo, float depth, float phase_anisotropy, 
                                                              : -result.straight * interacting(-forward));
     result.through = max(through, 0.0);
     result.straight = max(result.straight + min(through, 0.0), 0.0);
+    // What is added for that must be there to be had.
+    float reflected = escaping * back;
+    float added = similarity > 0.0 ? reflected * (toward_albedo - 1.0) : 0.0;
+    result.reflected = reflected + min(added, max(1.0 - reflected - result.through - result.straight, 0.0));
     return result;
 }
 

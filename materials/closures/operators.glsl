@@ -15,12 +15,12 @@ float variance_to_roughness(float variance) {
 }
 
 // Variance that a rough interface adds to what is seen through it: refraction of the light on its way in and of the
-// view on its way out, each that of a lobe whose alpha is scaled by half of |n - 1| / n and |n - 1| (Belcour 2018),
-// for index 1.5 and at normal incidence. A base of any roughness counts alike.
-float refraction_variance(float roughness) {
-    float alpha = roughness * roughness;
-    float into = pow(min(alpha * (1.0 / 6.0), 0.9999), 1.1);
-    float out_of = pow(min(alpha * 0.25, 0.9999), 1.1);
+// view on its way out, each that of a lobe whose alpha is scaled by half of |n - 1| / n and |n - 1| (Belcour 2018), at
+// normal incidence. A base of any roughness counts alike.
+float refraction_variance(float roughness, float ior) {
+    float alpha = 0.5 * (ior - 1.0) * roughness * roughness;
+    float into = pow(min(alpha / ior, 0.9999), 1.1);
+    float out_of = pow(min(alpha, 0.9999), 1.1);
     return into / (1.0 - into) + out_of / (1.0 - out_of);
 }
 
@@ -34,6 +34,9 @@ float tracked_roughness(float roughness, float variance) {
 // whose parts lie independently of each other, so that a slab yields one closure whatever is above it.
 
 // How much what is seen through a subtree spreads. Known before any closure is, since closures depend on it.
+// Denser matter is metal and lets nothing through: how it would refract does not matter.
+const float opaque_ior = 2.5;
+
 struct Spread {
     float coverage;
     float variance;  // that the covered share adds to the slopes of what lies below
@@ -76,7 +79,8 @@ float slab_coverage(Slab slab, float cos_theta) { return slab.coverage; }
 Spread slab_spread(Slab slab, float cos_view) {
     Spread spread;
     spread.coverage = slab_coverage(slab, cos_view);
-    spread.variance = refraction_variance(slab.roughness);
+    spread.variance =
+        refraction_variance(slab.roughness, min(reflectance_to_ior(dot(slab.f0, vec3(1.0 / 3.0))), opaque_ior));
     return spread;
 }
 
@@ -206,12 +210,16 @@ Matter slab_matter(Slab slab, Closure closure) {
     return m;
 }
 
-// What a base under a layer sends out, relative to its first reflection: the layer throws light back to the base, again
-// and again. Diffuse light: (1 - K) / (1 - E K) (OpenPBR, "Coat darkening"). What a lobe mirrors meets the layer's
+// What a layer throws back to the base below it, again and again. Diffuse light: (1 - K) / (1 - E K) (OpenPBR, "Coat darkening"). What a lobe mirrors meets the layer's
 // surface as the view did, K near Fresnel's reflectance, and the more as diffuse light does the wider the lobe is; what
 // was totally reflected comes back at such angles again. Both widths are fits to random walks between a GGX lobe and a
 // smooth interface of index 1.5, off by 0.1; the layer's own facets turn light half as far as those of the base.
-vec3 bounce_factor(Matter top, Matter base) {
+struct Bounces {
+    vec3 leaving;   // of what the base reflects, by its first reflection
+    vec3 arriving;  // at the base, by what arrives there first
+};
+
+Bounces bounces_between(Matter top, Matter base) {
     float alpha = max(sqrt(base.alpha2 + 0.25 * top.alpha2), 1e-6);
     float cosine = max(base.cos_view, 0.01);
     vec3 width = vec3(1.0 - exp(-7.0 * pow(alpha, 0.3 + 1.5 * cosine)));
@@ -222,8 +230,12 @@ vec3 bounce_factor(Matter top, Matter base) {
     Underside later = mix_underside(top.diffuse, mix_underside(top.mirrored, returning, width_later), base.gloss);
     // 1 - back * albedo by positive terms: nothing is lost where both are 1.
     vec3 left = later.leaving + max(vec3(1.0) - later.back - later.leaving, vec3(0.0)) +
-                later.back * (vec3(1.0) - base.albedo);
-    return first.leaving + first.back * base.albedo * (later.leaving + vec3(1e-9)) / (left + vec3(1e-9));
+                later.back * (vec3(1.0) - base.albedo) + vec3(1e-9);
+    vec3 again = first.back * base.albedo;
+    Bounces bounces;
+    bounces.leaving = first.leaving + again * (later.leaving + vec3(1e-9)) / left;
+    bounces.arriving = vec3(1.0) + again / left;
+    return bounces;
 }
 
 // Of what lies below, seen through matter that covers only a part.
@@ -292,9 +304,9 @@ Matter layer_matter(Matter top, Matter base) {
     m.view_transmittance =
         t * top.view_transmittance + b * base.view_transmittance +
         tb * top.view_transmittance * base.view_transmittance;
-    vec3 below = top.passed * base.albedo * bounce_factor(top, base) * top.transmittance;
-    // Light goes on between the top, from below, and the base, from above.
-    vec3 passed = top.passed * base.passed / max(vec3(1.0) - base.albedo * top.diffuse.back, vec3(1e-6));
+    Bounces bounces = bounces_between(top, base);
+    vec3 below = top.passed * base.albedo * bounces.leaving * top.transmittance;
+    vec3 passed = top.passed * base.passed * bounces.arriving;
     m.diffuse = layer_underside(top.diffuse, base.diffuse, base, t, b, tb);
     m.mirrored = layer_underside(top.mirrored, base.mirrored, base, t, b, tb);
     m.trapped = layer_underside(top.trapped, base.trapped, base, t, b, tb);
@@ -319,7 +331,7 @@ Path path_through_mix(Path path, float amount) {
 // material: light that is thrown back may hit any part of it.
 Path path_through_layer(Path path, Matter top, Matter base) {
     vec3 beside = vec3(1.0 - top.coverage);
-    vec3 through = top.coverage * top.view_transmittance * bounce_factor(top, base);
+    vec3 through = top.coverage * top.view_transmittance * bounces_between(top, base).leaving;
     vec3 sum = beside + through;
     // Where nothing comes through the rest does not matter.
     vec3 by = beside / max(sum, vec3(1e-30));
