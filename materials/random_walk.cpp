@@ -163,7 +163,7 @@ struct RandomWalk::Model {
         leaf.fresnel = library.slab_fresnel(slab);
         leaf.is_exact = desc.exact_fresnel && slab.f0.x == slab.f0.y && slab.f0.y == slab.f0.z && slab.f0.x >= 0.02 &&
                         slab.f0.x <= 0.2 && (slab.features & (slab_f90 | slab_f82)) == 0;
-        if (leaf.has_interface) leaf.ior = library.reflectance_to_ior(mean(slab.f0));
+        if (leaf.has_interface) leaf.ior = library.medium_ior(mean(slab.f0));
         const double stretch = (slab.features & slab_anisotropy) != 0 ? slab.anisotropy : 0.0;
         const auto lobe = [&](double roughness) {
             return Leaf::Lobe{.is_mirror = library.ggx_is_mirror(roughness),
@@ -184,7 +184,7 @@ struct RandomWalk::Model {
             const double albedo = slab.albedo[channel];
             const double alone = albedo / std::max(1.0 - inner + inner * albedo, 1e-12);
             leaf.single[channel] =
-                library.scattering_albedo(library.medium_similarity(alone), slab.phase_anisotropy);
+                library.scattering_albedo(library.medium_similarity(alone, 1.0 - alone), slab.phase_anisotropy);
         }
         leaf.scatters = largest(leaf.single) > 0.0;
         return leaf;

@@ -33,7 +33,7 @@
 //     vec3 closure_transmittance(Closure closure, float cos_theta)    straight through the medium, by outer direction
 //     vec3 closure_throughput(Closure closure)                        of the view: through fuzz, interface and medium
 //     float slab_coverage(Slab slab, float cos_theta)                 where a slab may have slab_edge_coverage
-//     vec3 internal_reflectance(Slab slab)                            K, of diffuse light from the medium's side
+//     vec3 internal_transmittance(Slab slab)                          of diffuse light from the medium's side
 //
 // Who includes this provides the tables (materials/closures/tables.glsl, medium.glsl) and, where a slab may have
 // slab_specular_lut, vec3 specular_lut(uint index, vec2 at): the tint by the cosines of view and light to the normal.
@@ -169,6 +169,9 @@ float diffuse_lobe(Closure closure, vec3 light) {
 #endif
 }
 
+// Of diffuse light, about half way between its mean cosine and its most frequent one.
+const float mean_cosine = 0.6;
+
 // Of the interface without a film.
 Fresnel slab_fresnel(Slab slab) {
     vec3 f90 = vec3(1.0);
@@ -182,21 +185,20 @@ Fresnel slab_fresnel(Slab slab) {
     return make_fresnel(slab.f0, f90, f82);
 }
 
-// Of diffuse light that hits the interface from the medium's side: what leaves through a denser medium's surface is
-// what enters it, spread over index^2 times the angle.
-float internal_reflectance_of(float f0, float mean) { return 1.0 - (1.0 - mean) / square(reflectance_to_ior(f0)); }
+// Index of refraction of a slab's medium by the reflectance of its interface. What reflects more than diamond does is
+// metal and hardly lets light through; how it would refract does not matter.
+float medium_ior(float f0) { return reflectance_to_ior(min(f0, 0.2)); }
 
-vec3 internal_reflectance(Slab slab) {
-    Fresnel fresnel = make_fresnel(slab.f0, vec3(1.0), vec3(1.0));
-    vec3 mean = fresnel_mean(fresnel);
-    return vec3(internal_reflectance_of(slab.f0.x, mean.x), internal_reflectance_of(slab.f0.y, mean.y),
-                internal_reflectance_of(slab.f0.z, mean.z));
+// Of diffuse light that hits the interface from the medium's side, what leaves: through a denser medium's surface as much
+// as enters it, spread over index^2 times the angle. At least 0.05, which is less than any dielectric's, so that it may be
+// divided by.
+vec3 internal_transmittance(Slab slab) {
+    vec3 mean = fresnel_mean_transmittance(slab_fresnel(slab));
+    vec3 ior = vec3(medium_ior(slab.f0.x), medium_ior(slab.f0.y), medium_ior(slab.f0.z));
+    return clamp(mean / (ior * ior), vec3(0.05), vec3(1.0));
 }
 
 #ifdef NACRE_SLAB_MEDIUM
-// Of diffuse light, about half way between its mean cosine and its most frequent one.
-const float mean_cosine = 0.6;
-
 // What becomes of light inside the slab, for each channel.
 struct MediumScattering {
     vec3 reflected;  // back to the interface
@@ -205,20 +207,25 @@ struct MediumScattering {
     vec3 opaque;
 };
 
-// The medium's own albedo: what is authored has the interface's part in it, which throws light back into the medium.
-float albedo_of_medium(float albedo, float internal) {
-    return albedo / max((1.0 - internal) + internal * albedo, 1e-30);
+// Light that goes up from the medium to the interface in all, where what it throws back is reflected again, and again.
+vec3 upwards_in_medium(vec3 reflected, vec3 leaving, vec3 reflected_again) {
+    return reflected / max((vec3(1.0) - reflected_again) + leaving * reflected_again, vec3(1e-9));
+}
+
+// One channel. The authored albedo has the interface's part in it, which lets `leaving` of diffuse light out and throws
+// the rest back into the medium: the medium's own is higher.
+Scattering channel_scattering(float albedo, float leaving, float mean_free_path, Slab slab, float cosine) {
+    float sum = leaving + (1.0 - leaving) * albedo;
+    return medium_scattering(albedo / sum, leaving * (1.0 - albedo) / sum, optical_depth(mean_free_path, slab.thickness),
+                             slab.phase_anisotropy, cosine);
 }
 
 // cosine: inside the medium.
 MediumScattering slab_scattering(Slab slab, float cosine) {
-    vec3 internal = internal_reflectance(slab);
-    Scattering x = medium_scattering(albedo_of_medium(slab.albedo.x, internal.x),
-                                     optical_depth(slab.mean_free_path.x, slab.thickness), slab.phase_anisotropy, cosine);
-    Scattering y = medium_scattering(albedo_of_medium(slab.albedo.y, internal.y),
-                                     optical_depth(slab.mean_free_path.y, slab.thickness), slab.phase_anisotropy, cosine);
-    Scattering z = medium_scattering(albedo_of_medium(slab.albedo.z, internal.z),
-                                     optical_depth(slab.mean_free_path.z, slab.thickness), slab.phase_anisotropy, cosine);
+    vec3 leaving = internal_transmittance(slab);
+    Scattering x = channel_scattering(slab.albedo.x, leaving.x, slab.mean_free_path.x, slab, cosine);
+    Scattering y = channel_scattering(slab.albedo.y, leaving.y, slab.mean_free_path.y, slab, cosine);
+    Scattering z = channel_scattering(slab.albedo.z, leaving.z, slab.mean_free_path.z, slab, cosine);
     MediumScattering medium;
     medium.reflected = vec3(x.reflected, y.reflected, z.reflected);
     medium.through = vec3(x.through, y.through, z.through);
@@ -312,20 +319,19 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
                              optical_depth(slab.mean_free_path.y, slab.thickness),
                              optical_depth(slab.mean_free_path.z, slab.thickness));
         float inside = refracted_cosine(closure.view.z, closure.reflectance);
-        vec3 internal = internal_reflectance(slab);
+        vec3 leaving = internal_transmittance(slab);
         MediumScattering medium = slab_scattering(slab, inside);
         MediumScattering again = slab_scattering(slab, mean_cosine);
-        // What is scattered back meets the interface from below, and some of it comes again as diffuse light.
-        vec3 upwards = medium.reflected / max(vec3(1.0) - internal * again.reflected, vec3(1e-6));
+        vec3 upwards = upwards_in_medium(medium.reflected, leaving, again.reflected);
         vec3 share = vec3(subsurface_share(slab.albedo.x, slab.mean_free_path.x, footprint),
                           subsurface_share(slab.albedo.y, slab.mean_free_path.y, footprint),
                           subsurface_share(slab.albedo.z, slab.mean_free_path.z, footprint));
-        diffuse = entering * min(upwards * (vec3(1.0) - internal), vec3(1.0));
+        diffuse = entering * min(upwards * leaving, vec3(1.0));
         closure.thin = diffuse * (vec3(1.0) - medium.opaque);
         closure.subsurface = diffuse * medium.opaque * share;
         closure.diffuse = diffuse * medium.opaque * (vec3(1.0) - share);
         closure.transmission =
-            entering * (medium.through + internal * upwards * (again.through + again.straight));
+            entering * (medium.through + (vec3(1.0) - leaving) * upwards * (again.through + again.straight));
         closure.straight = entering * medium.straight;
         closure.transmission_probability = largest(closure.transmission);
     }

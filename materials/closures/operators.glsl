@@ -34,9 +34,6 @@ float tracked_roughness(float roughness, float variance) {
 // whose parts lie independently of each other, so that a slab yields one closure whatever is above it.
 
 // How much what is seen through a subtree spreads. Known before any closure is, since closures depend on it.
-// Denser matter is metal and lets nothing through: how it would refract does not matter.
-const float opaque_ior = 2.5;
-
 struct Spread {
     float coverage;
     float variance;  // that the covered share adds to the slopes of what lies below
@@ -80,7 +77,7 @@ Spread slab_spread(Slab slab, float cos_view) {
     Spread spread;
     spread.coverage = slab_coverage(slab, cos_view);
     spread.variance =
-        refraction_variance(slab.roughness, min(reflectance_to_ior(dot(slab.f0, vec3(1.0 / 3.0))), opaque_ior));
+        refraction_variance(slab.roughness, medium_ior(dot(slab.f0, vec3(1.0 / 3.0))));
     return spread;
 }
 
@@ -146,12 +143,13 @@ Path open_path() {
     return path;
 }
 
-// A medium that lets `through` pass of diffuse light and reflects `reflected`, under an interface.
-Underside underside_of(vec3 interface_reflectance, vec3 reflected, vec3 through) {
-    vec3 between = vec3(1.0) / max(vec3(1.0) - interface_reflectance * reflected, vec3(1e-6));
+// A medium that lets `through` pass of diffuse light and reflects `reflected`, under an interface that lets `leaving` out.
+Underside underside_of(vec3 leaving, vec3 reflected, vec3 through) {
+    vec3 kept = vec3(1.0) - reflected;
+    vec3 between = vec3(1.0) / max(kept + leaving * reflected, vec3(1e-9));
     Underside u;
-    u.back = min(reflected + through * through * interface_reflectance * between, vec3(1.0));
-    u.leaving = (vec3(1.0) - reflected) * (vec3(1.0) - interface_reflectance) * between;
+    u.back = min(reflected + through * through * (vec3(1.0) - leaving) * between, vec3(1.0));
+    u.leaving = kept * leaving * between;
     return u;
 }
 
@@ -161,7 +159,7 @@ Matter base_matter(Slab slab, float cos_view) {
     m.coverage = slab_coverage(slab, cos_view);
     m.cos_view = cos_view;
     m.alpha2 = square(square(slab.roughness));
-    vec3 from_below = internal_reflectance(slab);
+    vec3 leaving = internal_transmittance(slab);
     vec3 albedo = slab.albedo;
     vec3 out_of_medium = vec3(0.0);
     vec3 reflected = slab.albedo;
@@ -174,9 +172,9 @@ Matter base_matter(Slab slab, float cos_view) {
         reflected = medium.reflected;
         through = medium.through + medium.straight;
         scattered = medium.through / max(through, vec3(1e-30));
-        vec3 upwards = reflected / max(vec3(1.0) - from_below * reflected, vec3(1e-6));
-        albedo = min(upwards * (vec3(1.0) - from_below), vec3(1.0));
-        out_of_medium = through * (vec3(1.0) + upwards * from_below);
+        vec3 upwards = upwards_in_medium(reflected, leaving, reflected);
+        albedo = min(upwards * leaving, vec3(1.0));
+        out_of_medium = through * (vec3(1.0) + upwards * (vec3(1.0) - leaving));
         m.transmittance = exp(log(clamp(through / max(vec3(1.0) - reflected, vec3(1e-6)), vec3(1e-30), vec3(1.0))) *
                               mean_cosine);
     }
@@ -186,13 +184,12 @@ Matter base_matter(Slab slab, float cos_view) {
     m.albedo = mean + (vec3(1.0) - mean) * albedo;
     m.passed = (vec3(1.0) - mean) * out_of_medium;
     m.gloss = mean / max(m.albedo, vec3(1e-30));
-    m.diffuse = underside_of(from_below, reflected, through);
+    m.diffuse = underside_of(leaving, reflected, through);
     // Light that was scattered on its way in is diffuse when it comes back.
-    m.mirrored = mix_underside(underside_of(fresnel_reflectance(fresnel, cos_view), reflected, through), m.diffuse,
+    m.mirrored = mix_underside(underside_of(fresnel_transmittance(fresnel, cos_view), reflected, through), m.diffuse,
                                scattered);
-    // A fit: 0.876 at index 1.5, for lobes so narrow that they hardly let anything escape that was reflected once.
-    vec3 trapping = vec3(1.0) - exp(log(max(vec3(1.0) - from_below, vec3(1e-6))) * 2.3);
-    m.trapped = mix_underside(underside_of(trapping, reflected, through), m.diffuse, scattered);
+    // A fit: 0.124 at index 1.5, for lobes so narrow that they hardly let anything escape that was reflected once.
+    m.trapped = mix_underside(underside_of(exp(log(leaving) * 2.3), reflected, through), m.diffuse, scattered);
 #ifdef NACRE_SLAB_FUZZ
     if ((slab.features & slab_fuzz) != 0u) {
         float fuzz = slab.fuzz_amount * sheen_albedo(mean_cosine, slab.fuzz_roughness);

@@ -235,7 +235,7 @@ TEST(Closure, BouncesBetweenInterfaceAndBaseAreASum) {
     EXPECT_NEAR(factor.z, 1.0, 1e-7) << "what loses nothing gives everything back";
     // 0.596 is the reflectance of an index of 1.5 from inside (Egan and Hilgeman 1979); Schlick's formula is off by
     // 0.003.
-    EXPECT_NEAR(library.internal_reflectance(Library::slab_of({.f0 = glm::vec3(0.04f)})).x, 0.596, 0.004);
+    EXPECT_NEAR(library.internal_transmittance(Library::slab_of({.f0 = glm::vec3(0.04f)})).x, 1.0 - 0.596, 0.004);
 }
 
 }  // namespace
