@@ -104,9 +104,10 @@ struct Closure {
 #ifdef NACRE_SLAB_SPECULAR_LUT
     uint specular_lut;
 #endif
-    float gloss;          // of the diffuse model
-    vec3 diffuse;         // albedo of what leaves where it entered
-    float diffuse_scale;  // one over the albedo of the diffuse lobe as it is
+    float under_interface;  // share of the diffuse light that comes through a layer's interface; cover_closure
+    float gloss;            // of the diffuse model
+    vec3 diffuse;           // albedo of what leaves where it entered
+    float diffuse_scale;    // one over the albedo of the diffuse lobe as it is
     float specular_probability;
     float diffuse_probability;
 };
@@ -235,6 +236,43 @@ MediumScattering slab_scattering(Slab slab, float cosine) {
 }
 #endif
 
+// The closure with the probabilities by which its lobes are sampled: by what each sends to the view.
+Closure with_probabilities(Closure closure) {
+    Closure result = closure;
+    vec3 diffuse = closure.diffuse;
+#ifdef NACRE_SLAB_MEDIUM
+    if ((closure.features & slab_medium) != 0u) diffuse += closure.thin + closure.subsurface;
+#endif
+    result.specular_probability = largest(closure.specular.albedo);
+    result.diffuse_probability = largest(diffuse);
+    float sum = result.specular_probability + result.diffuse_probability;
+#ifdef NACRE_SLAB_SECOND_LOBE
+    result.second_probability = (closure.features & slab_second_lobe) != 0u ? largest(closure.second.albedo) : 0.0;
+    sum += result.second_probability;
+#endif
+#ifdef NACRE_SLAB_FUZZ
+    result.fuzz_probability = (closure.features & slab_fuzz) != 0u ? largest(closure.fuzz) : 0.0;
+    sum += result.fuzz_probability;
+#endif
+#ifdef NACRE_SLAB_MEDIUM
+    result.transmission_probability = (closure.features & slab_medium) != 0u ? largest(closure.transmission) : 0.0;
+    sum += result.transmission_probability;
+#endif
+    float scale = sum > 0.0 ? 1.0 / sum : 0.0;
+    result.specular_probability *= scale;
+    result.diffuse_probability *= scale;
+#ifdef NACRE_SLAB_SECOND_LOBE
+    result.second_probability *= scale;
+#endif
+#ifdef NACRE_SLAB_FUZZ
+    result.fuzz_probability *= scale;
+#endif
+#ifdef NACRE_SLAB_MEDIUM
+    result.transmission_probability *= scale;
+#endif
+    return result;
+}
+
 Closure prepare_closure(Slab slab, vec3 view, float footprint) {
     Closure closure;
     closure.features = slab.features;
@@ -259,7 +297,6 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
     closure.glint_dy = slab.glint_dy;
 #endif
 #ifdef NACRE_SLAB_SECOND_LOBE
-    closure.second_probability = 0.0;
     if ((slab.features & slab_second_lobe) != 0u) {
         closure.second = make_specular_lobe(closure.fresnel, closure.view, slab.second_roughness, anisotropy);
         closure.specular.scale *= 1.0 - slab.second_weight;
@@ -267,24 +304,20 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
         closure.second.scale *= slab.second_weight;
         closure.second.albedo *= slab.second_weight;
         passed = mix(closure.specular.passed, closure.second.passed, slab.second_weight);
-        closure.second_probability = largest(closure.second.albedo);
     }
 #endif
     float uncovered = 1.0;
 #ifdef NACRE_SLAB_FUZZ
-    closure.fuzz_probability = 0.0;
     if ((slab.features & slab_fuzz) != 0u) {
         float reflected = slab.fuzz_amount * sheen_albedo(min(closure.view.z, 1.0), slab.fuzz_roughness);
         uncovered = 1.0 - reflected;
         closure.fuzz = reflected * slab.fuzz_color;
         closure.fuzz_map = sheen_map(closure.view, slab.fuzz_roughness);
-        closure.fuzz_probability = largest(closure.fuzz);
         closure.specular.scale *= uncovered;
         closure.specular.albedo *= uncovered;
 #ifdef NACRE_SLAB_SECOND_LOBE
         closure.second.scale *= uncovered;
         closure.second.albedo *= uncovered;
-        closure.second_probability *= uncovered;
 #endif
     }
 #endif
@@ -305,14 +338,10 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
         closure.specular.albedo *= tint;
 #ifdef NACRE_SLAB_SECOND_LOBE
         if ((slab.features & slab_second_lobe) != 0u) closure.second.albedo *= tint;
-        closure.second_probability *= largest(tint);
 #endif
     }
 #endif
-    closure.specular_probability = largest(closure.specular.albedo);
-    vec3 diffuse = closure.diffuse;
 #ifdef NACRE_SLAB_MEDIUM
-    closure.transmission_probability = 0.0;
     if ((slab.features & slab_medium) != 0u) {
         closure.reflectance = dot(slab.f0, vec3(1.0 / 3.0));
         closure.depth = vec3(optical_depth(slab.mean_free_path.x, slab.thickness),
@@ -326,40 +355,51 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
         vec3 share = vec3(subsurface_share(slab.albedo.x, slab.mean_free_path.x, footprint),
                           subsurface_share(slab.albedo.y, slab.mean_free_path.y, footprint),
                           subsurface_share(slab.albedo.z, slab.mean_free_path.z, footprint));
-        diffuse = entering * min(upwards * leaving, vec3(1.0));
+        vec3 diffuse = entering * min(upwards * leaving, vec3(1.0));
         closure.thin = diffuse * (vec3(1.0) - medium.opaque);
         closure.subsurface = diffuse * medium.opaque * share;
         closure.diffuse = diffuse * medium.opaque * (vec3(1.0) - share);
         closure.transmission =
             entering * (medium.through + (vec3(1.0) - leaving) * upwards * (again.through + again.straight));
         closure.straight = entering * medium.straight;
-        closure.transmission_probability = largest(closure.transmission);
     }
 #endif
-    closure.diffuse_probability = largest(diffuse);
-    float sum = closure.specular_probability + closure.diffuse_probability;
+    closure.under_interface = 0.0;
+    return with_probabilities(closure);
+}
+
+// A closure that is seen through layers. spread: share of what its specular lobes send that does not come along them, but
+// as diffuse light does, having been scattered or thrown back on its way. under_interface: share of its light that comes
+// through an interface, which lets little in along the surface.
+Closure cover_closure(Closure closure, vec3 spread, float under_interface) {
+    Closure covered = closure;
+    vec3 sharp = vec3(1.0) - spread;
+    vec3 specular = closure.specular.albedo;
+    covered.specular.scale *= sharp;
+    covered.specular.albedo *= sharp;
 #ifdef NACRE_SLAB_SECOND_LOBE
-    sum += closure.second_probability;
+    if ((closure.features & slab_second_lobe) != 0u) {
+        specular += closure.second.albedo;
+        covered.second.scale *= sharp;
+        covered.second.albedo *= sharp;
+    }
 #endif
-#ifdef NACRE_SLAB_FUZZ
-    sum += closure.fuzz_probability;
+    covered.diffuse += specular * spread;
+    covered.under_interface = under_interface;
+    return with_probabilities(covered);
+}
+
+// Of diffuse light under an interface by the direction that it comes from, relative to its mean: by Schlick's formula the
+// same for all dielectrics. Over the mean of (1 - c)^5 over the lobe of Chan's model (a fit from below, so that no energy
+// is made), or over Lambert's.
+float interface_factor(Closure closure, vec3 light) {
+#if NACRE_DIFFUSE_MODEL == 0
+    float m = 1.0 - min(closure.view.z, 1.0);
+    float mean = mix(0.042 + m * m * (0.03 + 0.0115 * square(square(m))), 0.0374, chan_glossiness(closure.gloss));
+#else
+    float mean = 0.037;
 #endif
-#ifdef NACRE_SLAB_MEDIUM
-    sum += closure.transmission_probability;
-#endif
-    float scale = sum > 0.0 ? 1.0 / sum : 0.0;
-    closure.specular_probability *= scale;
-    closure.diffuse_probability *= scale;
-#ifdef NACRE_SLAB_SECOND_LOBE
-    closure.second_probability *= scale;
-#endif
-#ifdef NACRE_SLAB_FUZZ
-    closure.fuzz_probability *= scale;
-#endif
-#ifdef NACRE_SLAB_MEDIUM
-    closure.transmission_probability *= scale;
-#endif
-    return closure;
+    return mix(1.0, schlick_rest(min(light.z, 1.0), 1.0 - min(light.z, 1.0)) / (1.0 - mean), closure.under_interface);
 }
 
 vec3 specular_lobe_value(SpecularLobe lobe, vec3 view, vec3 light, vec3 h) {
@@ -408,6 +448,11 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
         value.subsurface = closure.subsurface * (light.z / pi);
     }
 #endif
+    if (closure.under_interface > 0.0) {
+        float factor = interface_factor(closure, light);
+        value.diffuse *= factor;
+        value.subsurface *= factor;
+    }
     return value;
 }
 

@@ -14,19 +14,34 @@ float variance_to_roughness(float variance) {
     return sqrt(pow(variance / (1.0 + variance), 1.0 / 1.1));
 }
 
-// Variance that a rough interface adds to what is seen through it: refraction of the light on its way in and of the
-// view on its way out, each that of a lobe whose alpha is scaled by half of |n - 1| / n and |n - 1| (Belcour 2018), at
-// normal incidence. A base of any roughness counts alike.
+// Variance that a rough interface adds to what is seen through it: refraction of the view on its way in and of the light
+// on its way out, each as wide outside as a lobe whose alpha is scaled by half of |n - 1| (Belcour 2018), at normal
+// incidence. A base of any roughness counts alike.
 float refraction_variance(float roughness, float ior) {
-    float alpha = 0.5 * (ior - 1.0) * roughness * roughness;
-    float into = pow(min(alpha / ior, 0.9999), 1.1);
-    float out_of = pow(min(alpha, 0.9999), 1.1);
-    return into / (1.0 - into) + out_of / (1.0 - out_of);
+    float a = pow(min(0.5 * (ior - 1.0) * roughness * roughness, 0.9999), 1.1);
+    return 2.0 * a / (1.0 - a);
 }
 
-// Perceptual roughness of a slab as it is seen through what adds a variance.
-float tracked_roughness(float roughness, float variance) {
-    return variance > 0.0 ? variance_to_roughness(roughness_to_variance(roughness) + variance) : roughness;
+// A lobe that leaves a denser medium is wider outside by its index; its variance is a power of alpha.
+float refraction_stretch(float ior) { return pow(ior, 1.1); }
+
+// How much wider what lies below is seen: its variance times `stretch`, and `variance` in addition.
+struct Widening {
+    float stretch;
+    float variance;
+};
+
+Widening no_widening() {
+    Widening widening;
+    widening.stretch = 1.0;
+    widening.variance = 0.0;
+    return widening;
+}
+
+// Perceptual roughness of a slab as it is seen through what widens it.
+float tracked_roughness(float roughness, Widening widening) {
+    if (widening.variance <= 0.0 && widening.stretch <= 1.0) return roughness;
+    return variance_to_roughness(roughness_to_variance(roughness) * widening.stretch + widening.variance);
 }
 
 // What the operators of a tree do to the matter they arrange: what is tracked follows Hillaire and de Rousiers,
@@ -36,7 +51,8 @@ float tracked_roughness(float roughness, float variance) {
 // How much what is seen through a subtree spreads. Known before any closure is, since closures depend on it.
 struct Spread {
     float coverage;
-    float variance;  // that the covered share adds to the slopes of what lies below
+    float stretch;   // of the variance of what lies below, by the covered share
+    float variance;  // that the covered share adds to it
 };
 
 // What a layer does with light from below: what it throws back, and what leaves it. The two make 1 where nothing is
@@ -58,7 +74,10 @@ struct Matter {
     vec3 albedo;              // reflectance for diffuse light from above
     vec3 passed;              // of diffuse light from above, what reaches the other side
     vec3 gloss;               // share of what is reflected towards the view that a lobe mirrors
-    float alpha2;             // squared GGX alpha of that lobe
+    float alpha2;             // squared GGX alpha of that lobe, as it is seen from outside
+    float ior;                // against what lies above
+    float under_interface;    // of light from above, share that comes through an interface
+    vec3 scattered;           // of light that passes, share that was scattered, and not only forwards
     float cos_view;
 };
 
@@ -67,6 +86,8 @@ struct Path {
     vec3 weight;         // of the slab's radiance, without its own coverage
     vec3 uncovered;      // share of `weight` that passes by all matter above, [0, 1]
     vec3 transmittance;  // of the rest for light, along the normal; top_transmittance turns it to the light
+    vec3 spread;         // share of what a lobe mirrors that comes up as diffuse light
+    float under_interface;  // share of the light that comes through an interface
 };
 
 #ifndef NACRE_SLAB_EDGE_COVERAGE
@@ -76,8 +97,9 @@ float slab_coverage(Slab slab, float cos_theta) { return slab.coverage; }
 Spread slab_spread(Slab slab, float cos_view) {
     Spread spread;
     spread.coverage = slab_coverage(slab, cos_view);
-    spread.variance =
-        refraction_variance(slab.roughness, medium_ior(dot(slab.f0, vec3(1.0 / 3.0))));
+    float ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
+    spread.stretch = refraction_stretch(ior);
+    spread.variance = refraction_variance(slab.roughness, ior);
     return spread;
 }
 
@@ -90,24 +112,34 @@ Spread cover_spread(Spread spread, float amount) {
 Spread mix_spread(Spread a, Spread b, float amount) {
     Spread spread;
     spread.coverage = (1.0 - amount) * a.coverage + amount * b.coverage;
-    float sum = (1.0 - amount) * a.coverage * a.variance + amount * b.coverage * b.variance;
-    spread.variance = sum / max(spread.coverage, 1e-30);
+    float share = amount * b.coverage / max(spread.coverage, 1e-30);
+    spread.stretch = mix(a.stretch, b.stretch, share);
+    spread.variance = mix(a.variance, b.variance, share);
     return spread;
+}
+
+// What lies below a layer, by what is above both.
+Widening widening_below(Widening above, Spread top) {
+    Widening widening;
+    widening.stretch = above.stretch * mix(1.0, top.stretch, top.coverage);
+    widening.variance = above.variance + above.stretch * top.coverage * top.variance;
+    return widening;
 }
 
 Spread layer_spread(Spread top, Spread base) {
+    Widening above = no_widening();
+    Widening both = widening_below(widening_below(above, top), base);
     Spread spread;
     spread.coverage = top.coverage + (1.0 - top.coverage) * base.coverage;
-    spread.variance = (top.coverage * top.variance + base.coverage * base.variance) / max(spread.coverage, 1e-30);
+    float covered = max(spread.coverage, 1e-30);
+    spread.stretch = 1.0 + (both.stretch - 1.0) / covered;
+    spread.variance = both.variance / covered;
     return spread;
 }
 
-// Variance of what lies below a layer, by that above both.
-float variance_below(float above, Spread top) { return above + top.coverage * top.variance; }
-
-Slab track_slab(Slab slab, float variance) {
+Slab track_slab(Slab slab, Widening widening) {
     Slab tracked = slab;
-    tracked.roughness = tracked_roughness(slab.roughness, variance);
+    tracked.roughness = tracked_roughness(slab.roughness, widening);
     return tracked;
 }
 
@@ -124,6 +156,9 @@ Matter no_matter() {
     m.passed = vec3(1.0);
     m.gloss = vec3(0.0);
     m.alpha2 = 0.0;
+    m.ior = 1.0;
+    m.under_interface = 0.0;
+    m.scattered = vec3(0.0);
     m.cos_view = 1.0;
     return m;
 }
@@ -140,6 +175,8 @@ Path open_path() {
     path.weight = vec3(1.0);
     path.uncovered = vec3(1.0);
     path.transmittance = vec3(1.0);
+    path.spread = vec3(0.0);
+    path.under_interface = 0.0;
     return path;
 }
 
@@ -159,6 +196,8 @@ Matter base_matter(Slab slab, float cos_view) {
     m.coverage = slab_coverage(slab, cos_view);
     m.cos_view = cos_view;
     m.alpha2 = square(square(slab.roughness));
+    m.ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
+    m.under_interface = saturated(largest(slab.f0) / smallest_reflectance);
     vec3 leaving = internal_transmittance(slab);
     vec3 albedo = slab.albedo;
     vec3 out_of_medium = vec3(0.0);
@@ -178,6 +217,9 @@ Matter base_matter(Slab slab, float cos_view) {
         m.transmittance = exp(log(clamp(through / max(vec3(1.0) - reflected, vec3(1e-6)), vec3(1e-30), vec3(1.0))) *
                               mean_cosine);
     }
+#endif
+#ifdef NACRE_SLAB_MEDIUM
+    m.scattered = scattered * (1.0 - max(slab.phase_anisotropy, 0.0));
 #endif
     Fresnel fresnel = slab_fresnel(slab);
     vec3 mean = fresnel_mean(fresnel);
@@ -214,10 +256,12 @@ Matter slab_matter(Slab slab, Closure closure) {
 struct Bounces {
     vec3 leaving;   // of what the base reflects, by its first reflection
     vec3 arriving;  // at the base, by what arrives there first
+    vec3 spread;    // share of `leaving` that the first reflection's lobe does not hold any more
 };
 
 Bounces bounces_between(Matter top, Matter base) {
-    float alpha = max(sqrt(base.alpha2 + 0.25 * top.alpha2), 1e-6);
+    // Inside the layer the lobe is as narrow as it was before it was refracted.
+    float alpha = max(sqrt(base.alpha2 / square(top.ior) + 0.25 * top.alpha2), 1e-6);
     float cosine = max(base.cos_view, 0.01);
     vec3 width = vec3(1.0 - exp(-7.0 * pow(alpha, 0.3 + 1.5 * cosine)));
     vec3 width_later = vec3(1.0 - exp(-60.0 * pow(alpha, 1.35) / pow(cosine, 1.7)));
@@ -230,7 +274,9 @@ Bounces bounces_between(Matter top, Matter base) {
                 later.back * (vec3(1.0) - base.albedo) + vec3(1e-9);
     vec3 again = first.back * base.albedo;
     Bounces bounces;
-    bounces.leaving = first.leaving + again * (later.leaving + vec3(1e-9)) / left;
+    vec3 again_leaving = again * (later.leaving + vec3(1e-9)) / left;
+    bounces.leaving = first.leaving + again_leaving;
+    bounces.spread = width_later * again_leaving / max(bounces.leaving, vec3(1e-30));
     bounces.arriving = vec3(1.0) + again / left;
     return bounces;
 }
@@ -272,6 +318,9 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     m.passed = mix(a.passed, b.passed, share);
     m.gloss = gloss_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
     m.alpha2 = alpha2_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
+    m.ior = mix(a.ior, b.ior, share);
+    m.under_interface = mix(a.under_interface, b.under_interface, share);
+    m.scattered = mix(a.scattered, b.scattered, share);
     m.cos_view = a.cos_view;
     return m;
 }
@@ -313,6 +362,10 @@ Matter layer_matter(Matter top, Matter base) {
     vec3 of_base = b * base.albedo + tb * below;
     m.gloss = gloss_of_both(top, of_top, base, of_base);
     m.alpha2 = alpha2_of_both(top, of_top, base, of_base);
+    float only_above = (1.0 - top.under_interface * (t + tb)) * (1.0 - base.under_interface * (b + tb));
+    m.under_interface = 1.0 - only_above;
+    m.scattered = vec3(1.0) - (vec3(1.0) - top.scattered * (t + tb)) * (vec3(1.0) - base.scattered * (b + tb));
+    m.ior = mix(1.0, top.ior, t + tb) * mix(1.0, base.ior, b + tb);
     m.cos_view = base.cos_view;
     return m;
 }
@@ -328,12 +381,17 @@ Path path_through_mix(Path path, float amount) {
 // material: light that is thrown back may hit any part of it.
 Path path_through_layer(Path path, Matter top, Matter base) {
     vec3 beside = vec3(1.0 - top.coverage);
-    vec3 through = top.coverage * top.view_transmittance * bounces_between(top, base).leaving;
+    Bounces bounces = bounces_between(top, base);
+    vec3 through = top.coverage * top.view_transmittance * bounces.leaving;
     vec3 sum = beside + through;
     // Where nothing comes through the rest does not matter.
     vec3 by = beside / max(sum, vec3(1e-30));
     Path above;
     above.weight = path.weight * sum;
+    // Scattered on its way to the base or on its way back.
+    vec3 sharp = (vec3(1.0) - bounces.spread) * (vec3(1.0) - top.scattered) * (vec3(1.0) - top.scattered);
+    above.spread = vec3(1.0) - (vec3(1.0) - path.spread) * mix(sharp, vec3(1.0), by);
+    above.under_interface = 1.0 - (1.0 - path.under_interface) * (1.0 - top.under_interface * (1.0 - dot(by, vec3(1.0 / 3.0))));
     above.uncovered = path.uncovered * by;
     // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
     // that stands for both is between.

@@ -170,7 +170,8 @@ TEST(TreeMix, EndsAndEqualHalves) {
     EXPECT_NEAR(half.x, sum.x, 1e-9);
 }
 
-// A rough top makes what is below look rougher; a mirror does not, and only as much as it covers.
+// A rough top makes what is below look rougher, a smooth one wider by its index (alpha is roughness^2), and only as much
+// as it covers.
 TEST(TreeLayer, RoughnessIsTracked) {
     const auto below = [](float top_roughness, float coverage) {
         Tree tree{.name = "tracked"};
@@ -182,8 +183,8 @@ TEST(TreeLayer, RoughnessIsTracked) {
         tree.layer(tree.add(coat), base);
         return shade(*flatten(tree), view_at(1.0)).closures[1].slab.roughness;
     };
-    EXPECT_NEAR(below(0.0f, 1.0f), 0.2, 1e-6);
-    EXPECT_GT(below(0.6f, 1.0f), 0.25);
+    EXPECT_NEAR(below(0.0f, 1.0f), std::sqrt(0.2 * 0.2 * 1.5), 5e-3);
+    EXPECT_GT(below(0.6f, 1.0f), below(0.0f, 1.0f) + 0.02);
     EXPECT_GT(below(0.9f, 1.0f), below(0.6f, 1.0f));
     EXPECT_LT(below(0.6f, 0.5f), below(0.6f, 1.0f));
     EXPECT_NEAR(below(0.6f, 1e-6f), 0.2, 1e-4);
