@@ -276,7 +276,8 @@ Bounces bounces_between(Matter top, Matter base) {
     Bounces bounces;
     vec3 again_leaving = again * (later.leaving + vec3(1e-9)) / left;
     bounces.leaving = first.leaving + again_leaving;
-    bounces.spread = width_later * again_leaving / max(bounces.leaving, vec3(1e-30));
+    // Light that was thrown back still leaves about along the lobe for more than a half (by random walks as well).
+    bounces.spread = 0.4 * width_later * again_leaving / max(bounces.leaving, vec3(1e-30));
     bounces.arriving = vec3(1.0) + again / left;
     return bounces;
 }
