@@ -97,9 +97,16 @@ float slab_coverage(Slab slab, float cos_theta) { return slab.coverage; }
 Spread slab_spread(Slab slab, float cos_view) {
     Spread spread;
     spread.coverage = slab_coverage(slab, cos_view);
-    float ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
-    spread.stretch = refraction_stretch(ior);
-    spread.variance = refraction_variance(slab.roughness, ior);
+    spread.stretch = 1.0;
+    spread.variance = 0.0;
+#ifdef NACRE_SLAB_MEDIUM
+    // Nothing is seen through the others.
+    if ((slab.features & slab_medium) != 0u) {
+        float ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
+        spread.stretch = refraction_stretch(ior);
+        spread.variance = refraction_variance(slab.roughness, ior);
+    }
+#endif
     return spread;
 }
 

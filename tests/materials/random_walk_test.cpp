@@ -11,6 +11,8 @@
 #include <numbers>
 
 #include "materials/closures/library.h"
+#include "materials/layering_error.h"
+#include "materials/reference_stacks.h"
 #include "materials/tables/interface_table_generator.h"
 #include "materials/tables/medium_table_generator.h"
 
@@ -287,6 +289,25 @@ TEST(RandomWalk, PatchesAreNarrowOrWide) {
         const double below = narrow ? 0.5 * (1.0 - inner) / (1.0 - 0.5 * inner) : 0.5;
         expect_seen(walk.albedo(view_at(0.6), 200'000), above + (1.0 - above) * below, 1e-3, "narrow", narrow);
     }
+}
+
+// The closures of the stacks that authors use most are within 0.03 of the walk, on the mean over angles; of random stacks
+// most are, and none is off by more than 0.06.
+TEST(LayeringError, IsSmall) {
+    for (const Tree& stack : reference_stacks()) {
+        const FlattenedTree flat = *flatten(stack);
+        const LayeringError error = layering_error(flat, RandomWalk(flat), 8192);
+        EXPECT_LT(error.mean, 0.03) << stack.name;
+        EXPECT_LT(error.largest, 0.1) << stack.name;
+    }
+    int beyond = 0;
+    for (std::uint32_t i = 0; i < 48; ++i) {
+        const FlattenedTree flat = *flatten(random_stack(i));
+        const LayeringError error = layering_error(flat, RandomWalk(flat), 2048);
+        if (error.mean > 0.03) ++beyond;
+        EXPECT_LT(error.mean, 0.06) << flat.visible_tree.name;
+    }
+    EXPECT_LE(beyond, 8);
 }
 
 }  // namespace
