@@ -7,10 +7,10 @@
 /// Each row: the approximation, its mean and largest error against what is named, and nanoseconds for one evaluation
 /// (the median of nine runs).
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -103,10 +103,11 @@ void layers(Report& report) {
     for (std::size_t i = 0; i < paths.size(); ++i) {
         std::vector<RandomWalk> walk;
         for (const FlattenedTree& stack : stacks) walk.emplace_back(stack);
-        report.add("all paths, " + std::to_string(paths[i]) + " of them by chance", against, walks[i],
-                   nanoseconds(10, [&](int k) {
-                       return walk[static_cast<std::size_t>(k) % walk.size()].albedo(view_at(0.6), paths[i]).reflected.x;
-                   }));
+        report.add(
+            "all paths, " + std::to_string(paths[i]) + " of them by chance", against, walks[i],
+            nanoseconds(10, [&](int k) {
+                return walk[static_cast<std::size_t>(k) % walk.size()].albedo(view_at(0.6), paths[i]).reflected.x;
+            }));
     }
 }
 
@@ -135,7 +136,8 @@ void tables(Report& report) {
             }
         }
         const auto read = [&](double cosine, double alpha) {
-            const double x = lobes.ggx_table_coordinate(cosine, alpha) * (columns - 1), y = std::sqrt(alpha) * (rows - 1);
+            const double x = lobes.ggx_table_coordinate(cosine, alpha) * (columns - 1),
+                         y = std::sqrt(alpha) * (rows - 1);
             const int i = std::min(static_cast<int>(x), columns - 2), k = std::min(static_cast<int>(y), rows - 2);
             const double* at = &table[static_cast<std::size_t>(k * columns + i)];
             return std::lerp(std::lerp(at[0], at[1], x - i), std::lerp(at[columns], at[columns + 1], x - i), y - k);
@@ -144,8 +146,7 @@ void tables(Report& report) {
         for (const Point& point : points) errors.add(read(point.cosine, point.alpha) - point.missing);
         report.add("energy table of " + std::to_string(columns) + " x " + std::to_string(rows) + ", " +
                        std::to_string(2 * columns * rows) + " bytes",
-                   "quadrature, albedo with F = 1", errors,
-                   nanoseconds(200000, [&](int i) {
+                   "quadrature, albedo with F = 1", errors, nanoseconds(200000, [&](int i) {
                        const Point& point = points[static_cast<std::size_t>(i) % points.size()];
                        return read(point.cosine, point.alpha);
                    }));
@@ -170,8 +171,8 @@ void lobe(Report& report, const std::string& name, const std::string& against, d
         lights.push_back(Library{}.cosine_direction(u, v));
     }
     report.add(name, against, errors, nanoseconds(100000, [&](int i) {
-                   return value(lights[static_cast<std::size_t>(i) % 256], lights[static_cast<std::size_t>(i) * 7 % 256],
-                                0.1 + 0.8 * (i % 13) / 13.0);
+                   return value(lights[static_cast<std::size_t>(i) % 256],
+                                lights[static_cast<std::size_t>(i) * 7 % 256], 0.1 + 0.8 * (i % 13) / 13.0);
                }));
 }
 
@@ -180,9 +181,8 @@ void lobes(Report& report) {
     using Vector = glm::dvec3;
     const std::string white = "white light, albedo 1";
     lobe(report, "Lambert", white, 1.0, [&](Vector, Vector light, double) { return library.lambert_diffuse(light); });
-    lobe(report, "renormalized Disney", white, 1.0, [&](Vector view, Vector light, double roughness) {
-        return library.disney_diffuse(view, light, roughness);
-    });
+    lobe(report, "renormalized Disney", white, 1.0,
+         [&](Vector view, Vector light, double roughness) { return library.disney_diffuse(view, light, roughness); });
     lobe(report, "Chan as published", white, 1.0, [&](Vector view, Vector light, double roughness) {
         return library.chan_diffuse(view, light, library.chan_gloss(roughness));
     });
@@ -191,9 +191,11 @@ void lobes(Report& report) {
         return library.chan_diffuse(view, light, gloss) / library.chan_albedo_by_table(view.z, gloss);
     });
     const std::string sheen = "albedo of the volumetric fit (Zeltner 2022)";
-    lobe(report, "sheen by linearly transformed cosines", sheen, -1.0, [&](Vector view, Vector light, double roughness) {
-        return library.sheen_albedo(view.z, roughness) * library.sheen_density(library.sheen_map(view, roughness), light);
-    });
+    lobe(report, "sheen by linearly transformed cosines", sheen, -1.0,
+         [&](Vector view, Vector light, double roughness) {
+             return library.sheen_albedo(view.z, roughness) *
+                    library.sheen_density(library.sheen_map(view, roughness), light);
+         });
     lobe(report, "Charlie, Neubelt's visibility", sheen, -1.0, [&](Vector view, Vector light, double roughness) {
         return library.charlie_distribution(library.half_vector(view, light).z, roughness) *
                library.neubelt_visibility(view.z, light.z) * light.z;
@@ -215,8 +217,8 @@ void packing(Report& report) {
     const auto packed = [&](Slab slab) {
         for (int channel = 0; channel < 3; ++channel) {
             slab.f0[channel] = rounded(slab.f0[channel], bits[static_cast<std::size_t>(channel)]);
-            slab.albedo[channel] =
-                std::pow(rounded(std::pow(slab.albedo[channel], 1.0f / 2.2f), bits[static_cast<std::size_t>(channel)]), 2.2f);
+            slab.albedo[channel] = std::pow(
+                rounded(std::pow(slab.albedo[channel], 1.0f / 2.2f), bits[static_cast<std::size_t>(channel)]), 2.2f);
         }
         slab.roughness = rounded(slab.roughness, 8);
         return slab;
@@ -233,7 +235,8 @@ void packing(Report& report) {
         slabs.push_back(slab);
     }
     const auto albedo = [&](const Slab& slab, double cosine) {
-        const auto lobes = library.closure_albedo(library.prepare_closure(Library::slab_of(slab), view_at(cosine), 1e-3));
+        const auto lobes =
+            library.closure_albedo(library.prepare_closure(Library::slab_of(slab), view_at(cosine), 1e-3));
         return lobes.specular + lobes.diffuse;
     };
     Errors errors;

@@ -9,8 +9,8 @@
 /// the lit balls. FOLDER gets the balls side by side: closures, walk, difference times four. Exit status 1 where one of
 /// the five stacks that authors use most is off by 0.03 or more.
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -45,7 +45,8 @@ Image side_by_side(const Image& closures, const Image& walk) {
 }
 
 std::string file_name(std::string name) {
-    std::ranges::replace_if(name, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; }, '-');
+    std::ranges::replace_if(
+        name, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; }, '-');
     return name + ".png";
 }
 
@@ -103,6 +104,7 @@ int main(int count, char** arguments) {
     }
     std::printf("%-52s %8.4f %31s %8.4f\n", "mean of all", sum_of_means / static_cast<double>(stacks.size()), "",
                 sum_of_flips / static_cast<double>(stacks.size()));
-    if (!json.empty()) std::ofstream(json) << nlohmann::ordered_json{{"paths", paths}, {"stacks", rows}}.dump(2) << '\n';
+    if (!json.empty())
+        std::ofstream(json) << nlohmann::ordered_json{{"paths", paths}, {"stacks", rows}}.dump(2) << '\n';
     return is_close ? 0 : 1;
 }

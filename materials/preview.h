@@ -19,9 +19,9 @@ namespace nacre::materials {
 /// are enough for the eye, 16 for comparing with walked_ball().
 [[nodiscard]] Image preview_ball(const FlattenedTree& tree, std::uint32_t size, int strata = 6);
 
-/// The same ball by random walks instead of closures, without emission. `paths` for each view: 4096 leave noise that FLIP
-/// counts as about 0.01, 16384 half of that. Stacks that look the same from every azimuth take a few seconds, since all
-/// pixels seen at one angle share their paths; others walk for each pixel, with a sixteenth of the paths.
+/// The same ball by random walks instead of closures, without emission. `paths` for each view: 4096 leave noise that
+/// FLIP counts as about 0.01, 16384 half of that. Stacks that look the same from every azimuth take a few seconds,
+/// since all pixels seen at one angle share their paths; others walk for each pixel, with a sixteenth of the paths.
 [[nodiscard]] Image walked_ball(const RandomWalk& walk, std::uint32_t size, std::uint32_t paths);
 
 /// Radiance of the preview's sky, W/sr/m2. `direction`: unit, y up, z towards the viewer.

@@ -210,8 +210,7 @@ struct RandomWalk::Model {
         while (index != tree.root) {
             const NodeIndex parent = parents[index];
             const Node& node = tree.nodes[parent];
-            if (node.kind == NodeKind::layer && node.first == index)
-                choose(node.second, choices, view_cosine, random);
+            if (node.kind == NodeKind::layer && node.first == index) choose(node.second, choices, view_cosine, random);
             index = parent;
         }
     }
@@ -429,8 +428,7 @@ struct RandomWalk::Model {
     }
 
     // What the fuzz sends back to the side that `direction` is on.
-    static glm::dvec3 fuzz_direction(const Leaf& leaf, const glm::dvec3& direction, Carried& light,
-                                     Generator& random) {
+    static glm::dvec3 fuzz_direction(const Leaf& leaf, const glm::dvec3& direction, Carried& light, Generator& random) {
         const double side = direction.z < 0.0 ? -1.0 : 1.0;
         const Library::SheenMap map =
             library.sheen_map({direction.x, direction.y, std::abs(direction.z)}, leaf.slab.fuzz_roughness);

@@ -244,7 +244,8 @@ class Printer {
             const std::string prepared =
                 closure.path == 0
                     ? open
-                    : fmt::format("cover_closure({0}, state.paths[{1}].spread, state.paths[{1}].under_interface)", open, i);
+                    : fmt::format("cover_closure({0}, state.paths[{1}].spread, state.paths[{1}].under_interface)", open,
+                                  i);
             print(
                 "    vec3 weight_{0} = state.paths[{0}].weight * state.coverages[{0}];\n"
                 "    if (largest(weight_{0}) > 0.0) {{\n"

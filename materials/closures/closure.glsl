@@ -190,9 +190,9 @@ Fresnel slab_fresnel(Slab slab) {
 // metal and hardly lets light through; how it would refract does not matter.
 float medium_ior(float f0) { return reflectance_to_ior(min(f0, 0.2)); }
 
-// Of diffuse light that hits the interface from the medium's side, what leaves: through a denser medium's surface as much
-// as enters it, spread over index^2 times the angle. At least 0.05, which is less than any dielectric's, so that it may be
-// divided by.
+// Of diffuse light that hits the interface from the medium's side, what leaves: through a denser medium's surface as
+// much as enters it, spread over index^2 times the angle. At least 0.05, which is less than any dielectric's, so that
+// it may be divided by.
 vec3 internal_transmittance(Slab slab) {
     vec3 mean = fresnel_mean_transmittance(slab_fresnel(slab));
     vec3 ior = vec3(medium_ior(slab.f0.x), medium_ior(slab.f0.y), medium_ior(slab.f0.z));
@@ -217,8 +217,8 @@ vec3 upwards_in_medium(vec3 reflected, vec3 leaving, vec3 reflected_again) {
 // the rest back into the medium: the medium's own is higher.
 Scattering channel_scattering(float albedo, float leaving, float mean_free_path, Slab slab, float cosine) {
     float sum = leaving + (1.0 - leaving) * albedo;
-    return medium_scattering(albedo / sum, leaving * (1.0 - albedo) / sum, optical_depth(mean_free_path, slab.thickness),
-                             slab.phase_anisotropy, cosine);
+    return medium_scattering(albedo / sum, leaving * (1.0 - albedo) / sum,
+                             optical_depth(mean_free_path, slab.thickness), slab.phase_anisotropy, cosine);
 }
 
 // cosine: inside the medium.
@@ -368,9 +368,9 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
     return with_probabilities(closure);
 }
 
-// A closure that is seen through layers. spread: share of what its specular lobes send that does not come along them, but
-// as diffuse light does, having been scattered or thrown back on its way. under_interface: share of its light that comes
-// through an interface, which lets little in along the surface.
+// A closure that is seen through layers. spread: share of what its specular lobes send that does not come along them,
+// but as diffuse light does, having been scattered or thrown back on its way. under_interface: share of its light that
+// comes through an interface, which lets little in along the surface.
 Closure cover_closure(Closure closure, vec3 spread, float under_interface) {
     Closure covered = closure;
     vec3 sharp = vec3(1.0) - spread;
@@ -389,9 +389,9 @@ Closure cover_closure(Closure closure, vec3 spread, float under_interface) {
     return with_probabilities(covered);
 }
 
-// Of diffuse light under an interface by the direction that it comes from, relative to its mean: by Schlick's formula the
-// same for all dielectrics. Over the mean of (1 - c)^5 over the lobe of Chan's model (a fit from below, so that no energy
-// is made), or over Lambert's.
+// Of diffuse light under an interface by the direction that it comes from, relative to its mean: by Schlick's formula
+// the same for all dielectrics. Over the mean of (1 - c)^5 over the lobe of Chan's model (a fit from below, so that no
+// energy is made), or over Lambert's.
 float interface_factor(Closure closure, vec3 light) {
 #if NACRE_DIFFUSE_MODEL == 0
     float m = 1.0 - min(closure.view.z, 1.0);

@@ -65,9 +65,9 @@ struct Scattering {
 // Rows of the table: optical depths 2^-8 to 2^12.
 float medium_table_row(float depth) { return saturated((log2(clamp(depth, 1e-6, 1e6)) + 8.0) / 20.0); }
 
-// darkness: 1 - albedo. cosine: inside the medium. Directions of scattering are not told apart: a phase function g counts
-// as the isotropic one whose depth is scaled by 1 - w g (van de Hulst's similarity). Nothing is lost where nothing is
-// absorbed.
+// darkness: 1 - albedo. cosine: inside the medium. Directions of scattering are not told apart: a phase function g
+// counts as the isotropic one whose depth is scaled by 1 - w g (van de Hulst's similarity). Nothing is lost where
+// nothing is absorbed.
 Scattering medium_scattering(float albedo, float darkness, float depth, float phase_anisotropy, float cosine) {
     Scattering result;
     float similarity = medium_similarity(albedo, darkness);

@@ -10,13 +10,11 @@ float roughness_to_variance(float roughness) {
     return a / (1.0 - a);
 }
 
-float variance_to_roughness(float variance) {
-    return sqrt(pow(variance / (1.0 + variance), 1.0 / 1.1));
-}
+float variance_to_roughness(float variance) { return sqrt(pow(variance / (1.0 + variance), 1.0 / 1.1)); }
 
-// Variance that a rough interface adds to what is seen through it: refraction of the view on its way in and of the light
-// on its way out, each as wide outside as a lobe whose alpha is scaled by half of |n - 1| (Belcour 2018), at normal
-// incidence. A base of any roughness counts alike.
+// Variance that a rough interface adds to what is seen through it: refraction of the view on its way in and of the
+// light on its way out, each as wide outside as a lobe whose alpha is scaled by half of |n - 1| (Belcour 2018), at
+// normal incidence. A base of any roughness counts alike.
 float refraction_variance(float roughness, float ior) {
     float a = pow(min(0.5 * (ior - 1.0) * roughness * roughness, 0.9999), 1.1);
     return 2.0 * a / (1.0 - a);
@@ -83,10 +81,10 @@ struct Matter {
 
 // How a slab is seen through all that lies above it.
 struct Path {
-    vec3 weight;         // of the slab's radiance, without its own coverage
-    vec3 uncovered;      // share of `weight` that passes by all matter above, [0, 1]
-    vec3 transmittance;  // of the rest for light, along the normal; top_transmittance turns it to the light
-    vec3 spread;         // share of what a lobe mirrors that comes up as diffuse light
+    vec3 weight;            // of the slab's radiance, without its own coverage
+    vec3 uncovered;         // share of `weight` that passes by all matter above, [0, 1]
+    vec3 transmittance;     // of the rest for light, along the normal; top_transmittance turns it to the light
+    vec3 spread;            // share of what a lobe mirrors that comes up as diffuse light
     float under_interface;  // share of the light that comes through an interface
 };
 
@@ -187,7 +185,8 @@ Path open_path() {
     return path;
 }
 
-// A medium that lets `through` pass of diffuse light and reflects `reflected`, under an interface that lets `leaving` out.
+// A medium that lets `through` pass of diffuse light and reflects `reflected`, under an interface that lets `leaving`
+// out.
 Underside underside_of(vec3 leaving, vec3 reflected, vec3 through) {
     vec3 kept = vec3(1.0) - reflected;
     vec3 between = vec3(1.0) / max(kept + leaving * reflected, vec3(1e-9));
@@ -221,8 +220,8 @@ Matter base_matter(Slab slab, float cos_view) {
         vec3 upwards = upwards_in_medium(reflected, leaving, reflected);
         albedo = min(upwards * leaving, vec3(1.0));
         out_of_medium = through * (vec3(1.0) + upwards * (vec3(1.0) - leaving));
-        m.transmittance = exp(log(clamp(through / max(vec3(1.0) - reflected, vec3(1e-6)), vec3(1e-30), vec3(1.0))) *
-                              mean_cosine);
+        m.transmittance =
+            exp(log(clamp(through / max(vec3(1.0) - reflected, vec3(1e-6)), vec3(1e-30), vec3(1.0))) * mean_cosine);
     }
 #endif
 #ifdef NACRE_SLAB_MEDIUM
@@ -235,8 +234,8 @@ Matter base_matter(Slab slab, float cos_view) {
     m.gloss = mean / max(m.albedo, vec3(1e-30));
     m.diffuse = underside_of(leaving, reflected, through);
     // Light that was scattered on its way in is diffuse when it comes back.
-    m.mirrored = mix_underside(underside_of(fresnel_transmittance(fresnel, cos_view), reflected, through), m.diffuse,
-                               scattered);
+    m.mirrored =
+        mix_underside(underside_of(fresnel_transmittance(fresnel, cos_view), reflected, through), m.diffuse, scattered);
     // A fit: 0.124 at index 1.5, for lobes so narrow that they hardly let anything escape that was reflected once.
     m.trapped = mix_underside(underside_of(exp(log(leaving) * 2.3), reflected, through), m.diffuse, scattered);
 #ifdef NACRE_SLAB_FUZZ
@@ -256,10 +255,11 @@ Matter slab_matter(Slab slab, Closure closure) {
     return m;
 }
 
-// What a layer throws back to the base below it, again and again. Diffuse light: (1 - K) / (1 - E K) (OpenPBR, "Coat darkening"). What a lobe mirrors meets the layer's
-// surface as the view did, K near Fresnel's reflectance, and the more as diffuse light does the wider the lobe is; what
-// was totally reflected comes back at such angles again. Both widths are fits to random walks between a GGX lobe and a
-// smooth interface of index 1.5, off by 0.1; the layer's own facets turn light half as far as those of the base.
+// What a layer throws back to the base below it, again and again. Diffuse light: (1 - K) / (1 - E K) (OpenPBR, "Coat
+// darkening"). What a lobe mirrors meets the layer's surface as the view did, K near Fresnel's reflectance, and the
+// more as diffuse light does the wider the lobe is; what was totally reflected comes back at such angles again. Both
+// widths are fits to random walks between a GGX lobe and a smooth interface of index 1.5, off by 0.1; the layer's own
+// facets turn light half as far as those of the base.
 struct Bounces {
     vec3 leaving;   // of what the base reflects, by its first reflection
     vec3 arriving;  // at the base, by what arrives there first
@@ -355,9 +355,8 @@ Matter layer_matter(Matter top, Matter base) {
     float b = only_base / m.coverage;
     float tb = both / m.coverage;
     m.transmittance = t * top.transmittance + b * base.transmittance + tb * top.transmittance * base.transmittance;
-    m.view_transmittance =
-        t * top.view_transmittance + b * base.view_transmittance +
-        tb * top.view_transmittance * base.view_transmittance;
+    m.view_transmittance = t * top.view_transmittance + b * base.view_transmittance +
+                           tb * top.view_transmittance * base.view_transmittance;
     Bounces bounces = bounces_between(top, base);
     vec3 below = top.passed * base.albedo * bounces.leaving * top.transmittance;
     vec3 passed = top.passed * base.passed * bounces.arriving;
@@ -385,8 +384,8 @@ Path path_through_mix(Path path, float amount) {
     return above;
 }
 
-// A path that comes up from the base of a layer under `top`; `base` is all that lies below the top, to the bottom of the
-// material: light that is thrown back may hit any part of it.
+// A path that comes up from the base of a layer under `top`; `base` is all that lies below the top, to the bottom of
+// the material: light that is thrown back may hit any part of it.
 Path path_through_layer(Path path, Matter top, Matter base) {
     vec3 beside = vec3(1.0 - top.coverage);
     Bounces bounces = bounces_between(top, base);
@@ -399,7 +398,8 @@ Path path_through_layer(Path path, Matter top, Matter base) {
     // Scattered on its way to the base or on its way back.
     vec3 sharp = (vec3(1.0) - bounces.spread) * (vec3(1.0) - top.scattered) * (vec3(1.0) - top.scattered);
     above.spread = vec3(1.0) - (vec3(1.0) - path.spread) * mix(sharp, vec3(1.0), by);
-    above.under_interface = 1.0 - (1.0 - path.under_interface) * (1.0 - top.under_interface * (1.0 - dot(by, vec3(1.0 / 3.0))));
+    above.under_interface =
+        1.0 - (1.0 - path.under_interface) * (1.0 - top.under_interface * (1.0 - dot(by, vec3(1.0 / 3.0))));
     above.uncovered = path.uncovered * by;
     // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
     // that stands for both is between.

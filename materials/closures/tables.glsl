@@ -48,9 +48,8 @@ GgxAlbedo stretched_ggx_albedo(vec3 view, vec2 alpha) {
     float least = pow(smallest_alpha / larger, 1.0 / 3.0);
     float ratio_at = saturated((pow(ratio, 1.0 / 3.0) - least) / max(1.0 - least, 1e-6));
     // Straight down every azimuth is the same.
-    vec2 entry =
-        anisotropy_table(vec4(ggx_table_coordinate(cosine, seen), atan(sqrt(sqrt(ratio)) * across, along) * (2.0 / pi),
-                              ratio_at, sqrt(larger)));
+    vec2 entry = anisotropy_table(vec4(ggx_table_coordinate(cosine, seen),
+                                       atan(sqrt(sqrt(ratio)) * across, along) * (2.0 / pi), ratio_at, sqrt(larger)));
     GgxAlbedo albedo = ggx_albedo(cosine, seen);
     albedo.missing = entry.x;
     albedo.schlick = clamp(albedo.schlick + (entry.y - 0.25) * 0.5, 0.0, 1.0);

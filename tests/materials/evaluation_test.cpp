@@ -170,8 +170,8 @@ TEST(TreeMix, EndsAndEqualHalves) {
     EXPECT_NEAR(half.x, sum.x, 1e-9);
 }
 
-// A rough top makes what is below look rougher, a smooth one wider by its index (alpha is roughness^2), and only as much
-// as it covers.
+// A rough top makes what is below look rougher, a smooth one wider by its index (alpha is roughness^2), and only as
+// much as it covers.
 TEST(TreeLayer, RoughnessIsTracked) {
     const auto below = [](float top_roughness, float coverage) {
         Tree tree{.name = "tracked"};

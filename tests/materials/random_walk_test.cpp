@@ -83,8 +83,8 @@ TEST(RandomWalk, ASmoothInterfaceIsFresnels) {
     }
 }
 
-// A fairly smooth one sends back what single scattering does (by quadrature of the lobe), and of what that loses to other
-// microfacets no more than all.
+// A fairly smooth one sends back what single scattering does (by quadrature of the lobe), and of what that loses to
+// other microfacets no more than all.
 TEST(RandomWalk, ARoughInterfaceIsTheGgxLobe) {
     closures::Lobes lobes;
     const RandomWalk walk(alone(coat(0.15f)));
@@ -95,8 +95,8 @@ TEST(RandomWalk, ARoughInterfaceIsTheGgxLobe) {
         const double length = lobes.ggx_stretched_length(view, alpha);
         double single = 0.0, lost = 0.0;
         for (int i = 0; i < strata * strata; ++i) {
-            const glm::dvec3 h = lobes.ggx_sample_normal(view, length, alpha, (i % strata + 0.5) / strata,
-                                                         (i / strata + 0.5) / strata);
+            const glm::dvec3 h =
+                lobes.ggx_sample_normal(view, length, alpha, (i % strata + 0.5) / strata, (i / strata + 0.5) / strata);
             const double c = glm::dot(view, h), weight = lobes.ggx_weight(view, length, 2.0 * c * h - view, alpha);
             single += fresnel(c) * weight / (strata * strata);
             lost += fresnel(c) * (1.0 - weight) / (strata * strata);
@@ -136,7 +136,8 @@ TEST(RandomWalk, AnAbsorbingPlateIsTheGeometricSeries) {
     for (const double cosine : {1.0, 0.5, 0.1}) {
         const double inner = inner_cosine(cosine), through = std::exp(-2.0 * thickness / mean_free_path / inner);
         const double below = f0 + (1.0 - f0) * lobes.power5(1.0 - inner), above = fresnel(cosine);
-        const double expected = above + (1.0 - above) * (1.0 - above) * through * below / (1.0 - above * through * below);
+        const double expected =
+            above + (1.0 - above) * (1.0 - above) * through * below / (1.0 - above * through * below);
         expect_seen(walk.albedo(view_at(cosine), 200'000), expected, 0.0, "at", cosine);
     }
 }
@@ -184,7 +185,8 @@ TEST(RandomWalk, AScatteringLayerIsThatOfTheDoublingMethod) {
     }
 }
 
-// A thin layer scatters once: what goes back is the phase function's backward half (Henyey and Greenstein), straight on.
+// A thin layer scatters once: what goes back is the phase function's backward half (Henyey and Greenstein), straight
+// on.
 TEST(RandomWalk, AThinLayerScattersByThePhaseFunction) {
     closures::Library library;
     constexpr double depth = 0.01, g = 0.5;
@@ -291,8 +293,9 @@ TEST(RandomWalk, PatchesAreNarrowOrWide) {
     }
 }
 
-// The closures of the stacks that authors use most are within 0.03 of the walk, on the mean over angles; of random stacks
-// most are too. Those with two interfaces at grazing views are not (docs/materials.md): a bound tells when they get worse.
+// The closures of the stacks that authors use most are within 0.03 of the walk, on the mean over angles; of random
+// stacks most are too. Those with two interfaces at grazing views are not (docs/materials.md): a bound tells when they
+// get worse.
 TEST(LayeringError, IsSmall) {
     for (const Tree& stack : reference_stacks()) {
         const FlattenedTree flat = *flatten(stack);
