@@ -30,6 +30,8 @@ set(public_headers
   materials/closures/ggx.glsl materials/closures/glints.glsl materials/closures/haze.glsl materials/closures/math.glsl
   materials/closures/medium.glsl materials/closures/slab.glsl materials/closures/tables.glsl
   materials/closures/blending.glsl materials/closures/operators.glsl materials/closures/table_buffers.glsl
+  materials/closures/octahedral.glsl materials/closures/stored_fields.glsl materials/closures/stored_frame.glsl
+  materials/closures/table_textures.glsl materials/storage_shader.h
   materials/closures/thin_film.glsl materials/builtin_materials.h materials/description_tree.h materials/evaluation.h
   materials/preview.h materials/simplification.h materials/storage.h materials/topology.h materials/tree.h
   materials/tree_json.h materials/tree_shader.h

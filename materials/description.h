@@ -6,6 +6,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,6 +25,8 @@
 /// Colors are linear with sRGB primaries and a D65 white point. Lengths are meters, angles radians.
 
 namespace nacre::materials {
+
+struct Tree;
 
 /// Moves texture coordinates before the lookup (KHR_texture_transform):
 /// uv' = translate(offset) * rotate(rotation) * scale(scale) * uv, angles counter-clockwise as that extension draws it.
@@ -168,6 +171,9 @@ struct MaterialDescription {
     std::optional<Iridescence> iridescence;
     std::optional<DiffuseTransmission> diffuse_transmission;
     std::optional<SpecularGlossiness> specular_glossiness;
+    /// A tree of slabs (materials/tree.h) in place of all that shades above; emission, alpha, normals of plain slabs and
+    /// the like stay for whoever does without trees. Null: none.
+    std::shared_ptr<const Tree> tree;
     std::vector<UnknownExtension> other_extensions;  ///< By name; "extras" last, under that name.
 };
 

@@ -210,6 +210,9 @@ class Builder {
                 glass.mean_free_path = mean_free_path_of(base_color(), tree_.surface_thickness);
             }
             const NodeIndex node = add(glass, "transmissive");
+            if (material_.volume && material_.volume->thickness > 0.0f) {
+                texture_on(node, {.field = "thickness", .texture = material_.volume->thickness_texture, .channel = 1});
+            }
             root = tree_.mix(root, node, through);
             texture_on(root, {.field = "amount", .texture = material_.transmission->texture});
         } else if (scattered > 0.0f) {

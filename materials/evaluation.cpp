@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/evaluation.h"
 
+#include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
@@ -96,6 +97,8 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
         ShadedClosure result{.node = closure.node, .slab = slabs[closure.slab], .path = paths[closure.path]};
         result.slab.features &= closure.features;
         result.rotation = tree.visible_tree.frames[closure.frame].rotation;
+        result.frame_slot = static_cast<std::uint32_t>(std::ranges::find(topology.frames, closure.frame) -
+                                                       topology.frames.begin());
         result.closure =
             library.cover_closure(library.prepare_closure(result.slab, turned(view, result.rotation), footprint),
                                   result.path.spread, result.path.under_interface);

@@ -23,6 +23,7 @@ struct ShadedClosure {
     closures::Library::Path path;
     double coverage = 0.0;  ///< The slab's own, for this view.
     double rotation = 0.0;  ///< Radians that its tangent is turned from the surface's (TangentFrame).
+    std::uint32_t frame_slot = 0;  ///< Place of its frame in Topology::frames.
 };
 
 /// The tree for one view in the surface's local frame: z is the normal. Normal maps are not applied.

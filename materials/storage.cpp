@@ -1,75 +1,202 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/storage.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
 
 namespace nacre::materials {
 namespace {
 
-// Bits of a color: 7 each of red and green, 6 of blue, where the eye sees steps least.
-constexpr std::uint32_t color_bits = 20;
+using closures::Library;
 
-struct FeatureField {
-    std::uint32_t feature;
-    const char* name;
-    std::uint32_t bits;
+Library library;
+
+constexpr std::uint32_t color_bits = 20;
+constexpr double shortest_glint_step = 1e-9, longest_glint_step = 1e3;
+
+// In the order of StorageValue.
+constexpr StorageFormat formats[] = {
+    {StorageValue::pixel_class, "class", 2, StorageCodec::integer},
+    {StorageValue::closure_count, "closures", 3, StorageCodec::integer},
+    {StorageValue::frame_count, "frames", 2, StorageCodec::integer},
+    {StorageValue::tangent_flags, "tangents", 1, StorageCodec::integer},
+    {StorageValue::occlusion_flag, "has occlusion", 1, StorageCodec::integer},
+    {StorageValue::occlusion, "occlusion", 6, StorageCodec::unit},
+    {StorageValue::normal, "normal", 22, StorageCodec::direction},
+    {StorageValue::tangent, "tangent", 10, StorageCodec::angle},
+    {StorageValue::features, "features", 8, StorageCodec::integer},
+    {StorageValue::medium, "medium", 2, StorageCodec::integer},
+    {StorageValue::has_albedo, "has albedo", 1, StorageCodec::integer},
+    {StorageValue::is_below, "is below", 1, StorageCodec::integer},
+    {StorageValue::frame, "frame", 2, StorageCodec::integer},
+    {StorageValue::f0, "f0", color_bits, StorageCodec::color},
+    {StorageValue::albedo, "albedo", color_bits, StorageCodec::color},
+    {StorageValue::roughness, "roughness", 8, StorageCodec::unit},
+    {StorageValue::f90, "f90", color_bits, StorageCodec::color},
+    {StorageValue::f82, "f82", color_bits, StorageCodec::color},
+    {StorageValue::second_roughness, "second roughness", 8, StorageCodec::unit},
+    {StorageValue::second_weight, "second weight", 6, StorageCodec::unit},
+    {StorageValue::fuzz_amount, "fuzz amount", 6, StorageCodec::unit},
+    {StorageValue::fuzz_color, "fuzz color", color_bits, StorageCodec::color},
+    {StorageValue::fuzz_roughness, "fuzz roughness", 6, StorageCodec::unit},
+    {StorageValue::anisotropy, "anisotropy", 8, StorageCodec::signed_unit},
+    {StorageValue::film_thickness, "film thickness", 10, StorageCodec::logarithm, 1e-8, 1e-5},
+    {StorageValue::film_ior, "film ior", 6, StorageCodec::unit, 1.0, 3.0},
+    {StorageValue::specular_lut, "specular table", 8, StorageCodec::integer},
+    {StorageValue::glint_density, "glint density", 16, StorageCodec::logarithm, 1.0, 1e12},
+    {StorageValue::glint_x, "glint position x", 16, StorageCodec::fraction},
+    {StorageValue::glint_y, "glint position y", 16, StorageCodec::fraction},
+    {StorageValue::glint_dx_x, "glint derivative x of x", 16, StorageCodec::signed_logarithm, shortest_glint_step,
+     longest_glint_step},
+    {StorageValue::glint_dx_y, "glint derivative x of y", 16, StorageCodec::signed_logarithm, shortest_glint_step,
+     longest_glint_step},
+    {StorageValue::glint_dy_x, "glint derivative y of x", 16, StorageCodec::signed_logarithm, shortest_glint_step,
+     longest_glint_step},
+    {StorageValue::glint_dy_y, "glint derivative y of y", 16, StorageCodec::signed_logarithm, shortest_glint_step,
+     longest_glint_step},
+    {StorageValue::medium_transmittance, "medium transmittance", color_bits, StorageCodec::color},
+    {StorageValue::grey_weight, "weight", 8, StorageCodec::unit},
+    {StorageValue::weight, "weight", color_bits, StorageCodec::color},
+    {StorageValue::path_transmittance, "path transmittance", color_bits, StorageCodec::color},
+    {StorageValue::path_uncovered, "path uncovered", 6, StorageCodec::unit},
+};
+
+// Fields of features, in the order of the stream.
+constexpr StoredFeatureValue feature_values[] = {
+    {slab_f90, StorageValue::f90},
+    {slab_f82, StorageValue::f82},
+    {slab_second_lobe, StorageValue::second_roughness},
+    {slab_second_lobe, StorageValue::second_weight},
+    {slab_fuzz, StorageValue::fuzz_amount},
+    {slab_fuzz, StorageValue::fuzz_color},
+    {slab_fuzz, StorageValue::fuzz_roughness},
+    {slab_anisotropy, StorageValue::anisotropy},
+    {slab_thin_film, StorageValue::film_thickness},
+    {slab_thin_film, StorageValue::film_ior},
+    {slab_specular_lut, StorageValue::specular_lut},
+    {slab_glints, StorageValue::glint_density},
+    {slab_glints, StorageValue::glint_x},
+    {slab_glints, StorageValue::glint_y},
+    {slab_glints, StorageValue::glint_dx_x},
+    {slab_glints, StorageValue::glint_dx_y},
+    {slab_glints, StorageValue::glint_dy_x},
+    {slab_glints, StorageValue::glint_dy_y},
 };
 
 // Emission is added to the lit color at once and the view-dependent coverage is that of the pixel: neither is stored.
-constexpr FeatureField feature_fields[] = {
-    {slab_f90, "f90", color_bits},
-    {slab_f82, "f82", color_bits},
-    {slab_second_lobe, "second roughness", 8},
-    {slab_second_lobe, "second weight", 6},
-    {slab_fuzz, "fuzz amount", 6},
-    {slab_fuzz, "fuzz color", color_bits},
-    {slab_fuzz, "fuzz roughness", 6},
-    {slab_anisotropy, "anisotropy", 8},
-    {slab_thin_film, "film thickness", 10},
-    {slab_thin_film, "film ior", 6},
-    {slab_specular_lut, "specular table", 8},
-    {slab_glints, "glint density", 16},
-    {slab_glints, "glint position", 32},
-    {slab_glints, "glint derivatives", 64},
-};
+// The features' bits lie below that of the medium and are stored as they are.
+constexpr std::uint32_t feature_bits = slab_medium - 1u;
 
-constexpr std::uint32_t stored_features = [] {
-    std::uint32_t result = slab_medium;
-    for (const FeatureField& field : feature_fields) result |= field.feature;
-    return result;
-}();
+/// What each field is conditional on is asked twice, by the layout and by the reader: this is the one order.
+template <typename Field>
+void for_each_closure_field(std::uint32_t index, std::uint32_t closure_count, std::uint32_t features,
+                            StoredMedium medium, bool has_albedo, bool is_below, Field&& field) {
+    field(StorageValue::f0);
+    if (has_albedo) field(StorageValue::albedo);
+    if (index > 0) field(StorageValue::roughness);
+    for (const StoredFeatureValue& row : feature_values) {
+        if ((features & row.feature) != 0) field(row.value);
+    }
+    if (medium == StoredMedium::transmittance) field(StorageValue::medium_transmittance);
+    // Coverage and mixing weigh all channels alike; only what lies under a layer is tinted. A lone closure's coverage is
+    // the pixel's.
+    if (is_below) {
+        field(StorageValue::weight);
+        field(StorageValue::path_transmittance);
+        field(StorageValue::path_uncovered);
+    } else if (closure_count > 1) {
+        field(StorageValue::grey_weight);
+    }
+}
 
 class Layout {
   public:
-    explicit Layout(const FlattenedTree& tree) : tree_(tree), topology_(tree.topology) {}
+    Layout(const FlattenedTree& tree, const StorageOptions& options)
+        : tree_(tree), topology_(tree.topology), options_(options) {}
 
     StorageLayout run() {
-        result_.storage_class = storage_class();
-        add("class", 2);
-        if (result_.storage_class != StorageClass::simple) {
-            add("closures", 3);
-            add("frames", 3);
+        order();
+        for (std::uint32_t i = 0; i < result_.closures.size(); ++i) {
+            const TopologyClosure& closure = topology_.closures[result_.closures[i]];
+            result_.features.push_back(closure.features & feature_bits);
+            StoredMedium medium = StoredMedium::opaque;
+            if ((closure.features & slab_medium) != 0) {
+                if (closure.is_bottom) {
+                    medium = StoredMedium::subsurface;
+                } else if (!is_without_diffuse(closure.node)) {
+                    medium = StoredMedium::transmittance;
+                }
+            }
+            result_.media.push_back(medium);
+            result_.has_subsurface |= medium == StoredMedium::subsurface;
         }
-        for (std::uint32_t i = 0; i < topology_.closures.size(); ++i) add_closure(i);
+        result_.storage_class = storage_class();
+        if (result_.storage_class == StorageClass::simple) return simple();
+        const auto frames = static_cast<std::uint32_t>(result_.frames.size());
+        add(StorageValue::pixel_class);
+        add(StorageValue::closure_count);
+        add(StorageValue::frame_count);
+        add(StorageValue::tangent_flags, frames);
+        add(StorageValue::occlusion_flag);
+        if (options_.has_occlusion) add(StorageValue::occlusion);
         // The top layer's word has the first normal; a tangent is an angle around it.
-        for (std::size_t i = 0; i < topology_.frames.size(); ++i) {
-            if (i > 0) add("normal", 22);
-            if (needs_tangent(topology_.frames[i])) add("tangent", 10);
+        for (frame_ = 0; frame_ < frames; ++frame_) {
+            if (frame_ > 0) add(StorageValue::normal);
+            if (needs_tangent(frame_)) add(StorageValue::tangent);
+        }
+        frame_ = 0;
+        const auto closures = static_cast<std::uint32_t>(result_.closures.size());
+        for (closure_ = 0; closure_ < closures; ++closure_) {
+            const TopologyClosure& closure = topology_.closures[result_.closures[closure_]];
+            add(StorageValue::features);
+            add(StorageValue::medium);
+            add(StorageValue::has_albedo);
+            add(StorageValue::is_below);
+            if (frames > 1) add(StorageValue::frame);
+            for_each_closure_field(closure_, closures, result_.features[closure_], result_.media[closure_],
+                                   !is_without_diffuse(closure.node), !closure.is_top,
+                                   [this](StorageValue value) { add(value); });
         }
         return std::move(result_);
     }
 
   private:
+    void order() {
+        for (std::uint32_t i = 0; i < topology_.closures.size(); ++i) result_.closures.push_back(i);
+        std::ranges::stable_partition(result_.closures, [&](std::uint32_t i) { return topology_.closures[i].is_top; });
+        for (const std::uint32_t i : result_.closures) {
+            const std::uint32_t frame = slot(topology_.closures[i].frame);
+            if (std::ranges::find(result_.frames, frame) == result_.frames.end()) result_.frames.push_back(frame);
+        }
+    }
+
+    std::uint32_t slot(std::uint32_t frame) const {
+        return static_cast<std::uint32_t>(std::ranges::find(topology_.frames, frame) - topology_.frames.begin());
+    }
+
+    // Words of one slab without features, as the passes of the renderer have always written them; materials know their
+    // number only.
+    StorageLayout simple() { return std::move(result_); }
+
     StorageClass storage_class() const {
-        if ((topology_.features & (slab_glints | slab_specular_lut)) != 0) return StorageClass::special;
-        if (topology_.closures.size() > 1 || (topology_.features & slab_anisotropy) != 0) return StorageClass::complex;
-        return (topology_.features & stored_features) != 0 ? StorageClass::single : StorageClass::simple;
+        std::uint32_t features = 0;
+        for (const std::uint32_t one : result_.features) features |= one;
+        if ((features & (slab_glints | slab_specular_lut)) != 0) return StorageClass::special;
+        if (topology_.closures.size() > 1 || (features & slab_anisotropy) != 0) return StorageClass::complex;
+        return features != 0 || result_.media[0] != StoredMedium::opaque ? StorageClass::single : StorageClass::simple;
     }
 
     bool needs_tangent(std::uint32_t frame) const {
-        return std::ranges::any_of(topology_.closures, [&](const TopologyClosure& closure) {
-            return closure.frame == frame && (closure.features & slab_anisotropy) != 0;
-        });
+        for (std::size_t i = 0; i < result_.closures.size(); ++i) {
+            if (slot(topology_.closures[result_.closures[i]].frame) == result_.frames[frame] &&
+                (result_.features[i] & slab_anisotropy) != 0)
+                return true;
+        }
+        return false;
     }
 
     // Whether no pixel of the subtree reflects light from its medium.
@@ -84,51 +211,114 @@ class Layout {
         return false;
     }
 
-    void add_closure(std::uint32_t index) {
-        const TopologyClosure& closure = topology_.closures[index];
-        const bool is_single = topology_.closures.size() == 1;
-        closure_ = index;
-        if (result_.storage_class != StorageClass::simple) {
-            add("features", 12);
-            add("frame", topology_.frames.size() > 1 ? 2 : 0);
-        }
-        add("f0", color_bits);
-        if (!is_without_diffuse(closure.node)) add("albedo", color_bits);
-        // The first closure's roughness lies in the word of the top layer.
-        if (!(closure.is_top &&
-              std::ranges::find_if(topology_.closures, &TopologyClosure::is_top) - topology_.closures.begin() == index))
-            add("roughness", 8);
-        for (const FeatureField& field : feature_fields) {
-            if ((closure.features & field.feature) != 0) add(field.name, field.bits);
-        }
-        if ((closure.features & slab_medium) != 0) {
-            if (closure.is_bottom) {
-                result_.has_subsurface = true;
-            } else if (!is_without_diffuse(closure.node)) {
-                add("medium transmittance", color_bits);
-            }
-        }
-        // Coverage and mixing weigh all channels alike; only what lies under a layer is tinted. A lone closure's
-        // coverage is the pixel's.
-        if (closure.is_top) {
-            if (!is_single) add("weight", 8);
-        } else {
-            add("weight", color_bits);
-            add("path transmittance", color_bits);
-            add("path uncovered", 6);
-        }
-        closure_ = StorageLayout::no_closure;
-    }
-
-    void add(const char* name, std::uint32_t bits) {
-        if (bits > 0) result_.fields.push_back({.name = name, .closure = closure_, .bits = bits});
+    void add(StorageValue value, std::uint32_t bits = 0) {
+        if (bits == 0) bits = storage_format(value).bits;
+        result_.fields.push_back(
+            {.value = value, .closure = closure_, .frame = frame_, .offset = result_.bits(), .bits = bits});
     }
 
     const FlattenedTree& tree_;
     const Topology& topology_;
+    const StorageOptions options_;
     StorageLayout result_;
     std::uint32_t closure_ = StorageLayout::no_closure;
+    std::uint32_t frame_ = 0;
 };
+
+double octaves(const StorageFormat& format) { return std::log2(format.high / format.low); }
+
+/// A field of a slab as up to three numbers; nothing for what is not the slab's.
+glm::dvec3* color_of(Library::Slab& slab, StorageValue value) {
+    switch (value) {
+        case StorageValue::f0: return &slab.f0;
+        case StorageValue::albedo: return &slab.albedo;
+        case StorageValue::f90: return &slab.f90;
+        case StorageValue::f82: return &slab.f82;
+        case StorageValue::fuzz_color: return &slab.fuzz_color;
+        default: return nullptr;
+    }
+}
+
+double* number_of(Library::Slab& slab, StorageValue value) {
+    switch (value) {
+        case StorageValue::roughness: return &slab.roughness;
+        case StorageValue::second_roughness: return &slab.second_roughness;
+        case StorageValue::second_weight: return &slab.second_weight;
+        case StorageValue::fuzz_amount: return &slab.fuzz_amount;
+        case StorageValue::fuzz_roughness: return &slab.fuzz_roughness;
+        case StorageValue::anisotropy: return &slab.anisotropy;
+        case StorageValue::film_thickness: return &slab.film_thickness;
+        case StorageValue::film_ior: return &slab.film_ior;
+        case StorageValue::glint_density: return &slab.glint_density;
+        case StorageValue::glint_x: return &slab.glint_position.x;
+        case StorageValue::glint_y: return &slab.glint_position.y;
+        case StorageValue::glint_dx_x: return &slab.glint_dx.x;
+        case StorageValue::glint_dx_y: return &slab.glint_dx.y;
+        case StorageValue::glint_dy_x: return &slab.glint_dy.x;
+        case StorageValue::glint_dy_y: return &slab.glint_dy.y;
+        default: return nullptr;
+    }
+}
+
+std::uint32_t encode_number(const StorageFormat& format, std::uint32_t bits, double value, double dither) {
+    switch (format.codec) {
+        case StorageCodec::unit: return library.pack_unit((value - format.low) / (format.high - format.low), bits, dither);
+        case StorageCodec::signed_unit: return library.pack_signed(value, bits, dither);
+        case StorageCodec::logarithm: return library.pack_logarithm(value, bits, format.low, octaves(format), dither);
+        case StorageCodec::signed_logarithm:
+            return library.pack_signed_logarithm(value, bits, format.low, octaves(format), dither);
+        case StorageCodec::fraction: return library.pack_fraction(value, bits);
+        case StorageCodec::angle:
+            return static_cast<std::uint32_t>(value / std::numbers::pi * (1u << bits) + 0.5) & ((1u << bits) - 1u);
+        default: return 0;
+    }
+}
+
+double decode_number(const StorageFormat& format, std::uint32_t bits, std::uint32_t code) {
+    switch (format.codec) {
+        case StorageCodec::unit: return format.low + (format.high - format.low) * library.unpack_unit(code, bits);
+        case StorageCodec::signed_unit: return library.unpack_signed(code, bits);
+        case StorageCodec::logarithm: return library.unpack_logarithm(code, bits, format.low, octaves(format));
+        case StorageCodec::signed_logarithm:
+            return library.unpack_signed_logarithm(code, bits, format.low, octaves(format));
+        case StorageCodec::fraction: return library.unpack_fraction(code, bits);
+        case StorageCodec::angle: return code * std::numbers::pi / (1u << bits);
+        default: return code;
+    }
+}
+
+glm::dvec3 dither_of_color(glm::uvec2 position, std::uint32_t which) {
+    return {library.ordered_dither(position.x, position.y, which), library.ordered_dither(position.x, position.y, which + 1),
+            library.ordered_dither(position.x, position.y, which + 2)};
+}
+
+// As octahedral_encode() and octahedral_decode() of materials/closures/octahedral.glsl.
+std::uint32_t encode_direction(const glm::dvec3& n, std::uint32_t bits) {
+    const double sum = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
+    double x = n.x / sum, y = n.y / sum;
+    if (n.z < 0.0) {
+        const double folded = 1.0 - std::abs(y);
+        y = std::copysign(1.0 - std::abs(x), y);
+        x = std::copysign(folded, x);
+    }
+    const double half_range = (1u << (bits / 2 - 1)) - 1.0;
+    const auto code = [&](double v) {
+        return static_cast<std::uint32_t>(std::floor(std::clamp(v, -1.0, 1.0) * half_range + 0.5) + half_range);
+    };
+    return code(x) | code(y) << (bits / 2);
+}
+
+glm::dvec3 decode_direction(std::uint32_t code, std::uint32_t bits) {
+    const double half_range = (1u << (bits / 2 - 1)) - 1.0;
+    const std::uint32_t mask = (1u << (bits / 2)) - 1u;
+    double x = ((code & mask) - half_range) / half_range, y = ((code >> (bits / 2) & mask) - half_range) / half_range;
+    const double z = 1.0 - std::abs(x) - std::abs(y), fold = std::max(-z, 0.0);
+    x += x >= 0.0 ? -fold : fold;
+    y += y >= 0.0 ? -fold : fold;
+    return glm::normalize(glm::dvec3(x, y, z));
+}
+
+constexpr double shortest_path = 1e-6, longest_path = 10.0, longest_thickness = 1e3;
 
 }  // namespace
 
@@ -142,13 +332,223 @@ std::string_view name_of(StorageClass storage_class) {
     return "unknown";
 }
 
-std::uint32_t StorageLayout::material_words() const {
-    std::uint32_t bits = 0;
-    for (const StorageField& field : fields) bits += field.bits;
-    // Two render targets of material words are always there.
-    return std::max((bits + 31) / 32, 2u);
+std::span<const StorageFormat> storage_formats() { return formats; }
+std::span<const StoredFeatureValue> stored_feature_values() { return feature_values; }
+const StorageFormat& storage_format(StorageValue value) { return formats[static_cast<std::size_t>(value)]; }
+std::uint32_t stored_features() { return feature_bits | slab_medium; }
+
+// Two render targets of material words are always there.
+std::uint32_t StorageLayout::material_words() const { return std::max((bits() + 31) / 32, 2u); }
+
+StorageLayout storage_layout(const FlattenedTree& tree, const StorageOptions& options) {
+    return Layout(tree, options).run();
 }
 
-StorageLayout storage_layout(const FlattenedTree& tree) { return Layout(tree).run(); }
+std::uint32_t pack_subsurface(const Library::Slab& slab, glm::uvec2 position) {
+    std::uint32_t word = 0;
+    for (int channel = 0; channel < 3; ++channel) {
+        const double similarity = library.medium_similarity(slab.albedo[channel], 1.0 - slab.albedo[channel]);
+        const double isotropic = slab.mean_free_path[channel] *
+                                 (1.0 - slab.phase_anisotropy * similarity * similarity) / (1.0 - slab.phase_anisotropy);
+        word |= library.pack_logarithm(isotropic, 8, shortest_path, std::log2(longest_path / shortest_path),
+                                       library.ordered_dither(position.x, position.y, static_cast<std::uint32_t>(channel)))
+                << (8 * channel);
+    }
+    return word | library.pack_logarithm(slab.thickness, 8, shortest_path,
+                                         std::log2(longest_thickness / shortest_path), 0.5)
+                      << 24;
+}
+
+StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, const PixelInputs& inputs) {
+    StoredPixel pixel;
+    pixel.words.assign(layout.material_words(), 0);
+    const auto closure_of = [&](std::uint32_t i) -> const ShadedClosure& { return shaded.closures[layout.closures[i]]; };
+    pixel.roughness = closure_of(0).slab.roughness;
+    double seen_most = -1.0;
+    for (std::uint32_t i = 0; i < layout.closures.size(); ++i) {
+        if (layout.media[i] != StoredMedium::subsurface) continue;
+        const ShadedClosure& closure = closure_of(i);
+        const double seen = closure.path.weight.g * closure.coverage;
+        if (seen > seen_most) pixel.subsurface = pack_subsurface(closure.slab, inputs.position), seen_most = seen;
+    }
+    std::uint32_t which = 0;
+    for (const StorageField& field : layout.fields) {
+        const StorageFormat& format = storage_format(field.value);
+        std::uint32_t code = 0;
+        const ShadedClosure* closure = field.closure == StorageLayout::no_closure ? nullptr : &closure_of(field.closure);
+        const std::uint32_t at = field.closure;
+        const auto next_dither = [&] { return library.ordered_dither(inputs.position.x, inputs.position.y, which++); };
+        const auto color = [&](const glm::dvec3& value) {
+            code = library.pack_color(value, dither_of_color(inputs.position, which));
+            which += 3;
+        };
+        switch (field.value) {
+            case StorageValue::pixel_class: code = 3; break;
+            case StorageValue::closure_count: code = static_cast<std::uint32_t>(layout.closures.size()) - 1; break;
+            case StorageValue::frame_count: code = static_cast<std::uint32_t>(layout.frames.size()) - 1; break;
+            case StorageValue::tangent_flags:
+                for (const StorageField& other : layout.fields) {
+                    if (other.value == StorageValue::tangent) code |= 1u << other.frame;
+                }
+                break;
+            case StorageValue::occlusion_flag:
+                code = std::ranges::find(layout.fields, StorageValue::occlusion, &StorageField::value) != layout.fields.end();
+                break;
+            case StorageValue::occlusion: code = encode_number(format, field.bits, inputs.occlusion, 0.5); break;
+            case StorageValue::normal:
+                code = encode_direction(field.frame < inputs.normals.size() ? inputs.normals[field.frame] : glm::dvec3(0, 0, 1),
+                                        field.bits);
+                break;
+            case StorageValue::tangent:
+                code = encode_number(format, field.bits,
+                                     field.frame < inputs.tangent_angles.size() ? inputs.tangent_angles[field.frame] : 0.0, 0.5);
+                break;
+            case StorageValue::features: code = layout.features[at]; break;
+            case StorageValue::medium: code = static_cast<std::uint32_t>(layout.media[at]); break;
+            case StorageValue::has_albedo:
+                code = std::ranges::any_of(layout.fields, [&](const StorageField& other) {
+                    return other.value == StorageValue::albedo && other.closure == at;
+                });
+                break;
+            case StorageValue::is_below:
+                code = std::ranges::any_of(layout.fields, [&](const StorageField& other) {
+                    return other.value == StorageValue::weight && other.closure == at;
+                });
+                break;
+            case StorageValue::frame:
+                code = closure->frame_slot < layout.frames.size()
+                           ? static_cast<std::uint32_t>(std::ranges::find(layout.frames, closure->frame_slot) -
+                                                        layout.frames.begin())
+                           : 0;
+                break;
+            case StorageValue::specular_lut: code = closure->slab.specular_lut & 0xffu; break;
+            case StorageValue::medium_transmittance:
+                color(glm::dvec3(library.medium_transmittance(closure->slab.mean_free_path.x, closure->slab.thickness),
+                                 library.medium_transmittance(closure->slab.mean_free_path.y, closure->slab.thickness),
+                                 library.medium_transmittance(closure->slab.mean_free_path.z, closure->slab.thickness)));
+                break;
+            case StorageValue::grey_weight:
+                code = encode_number(format, field.bits, closure->path.weight.g * closure->coverage, next_dither());
+                break;
+            case StorageValue::weight: color(closure->path.weight * closure->coverage); break;
+            case StorageValue::path_transmittance: color(closure->path.transmittance); break;
+            case StorageValue::path_uncovered:
+                code = encode_number(format, field.bits,
+                                     (closure->path.uncovered.r + closure->path.uncovered.g + closure->path.uncovered.b) / 3.0,
+                                     next_dither());
+                break;
+            default: {
+                Library::Slab slab = closure->slab;
+                if (const glm::dvec3* value = color_of(slab, field.value)) {
+                    color(*value);
+                } else if (const double* number = number_of(slab, field.value)) {
+                    code = encode_number(format, field.bits, *number, next_dither());
+                }
+            }
+        }
+        const std::uint32_t word = field.offset / 32, shift = field.offset % 32;
+        pixel.words[word] |= code << shift;
+        if (shift + field.bits > 32) pixel.words[word + 1] |= code >> (32 - shift);
+    }
+    return pixel;
+}
+
+Expected<UnpackedMaterial> unpack_pixel(const StoredPixel& pixel) {
+    UnpackedMaterial material;
+    std::uint32_t cursor = 0, closure = StorageLayout::no_closure, frame = 0;
+    bool is_complete = true;
+    const auto read = [&](StorageValue value, std::uint32_t bits = 0) -> std::uint32_t {
+        if (bits == 0) bits = storage_format(value).bits;
+        const std::uint32_t word = cursor / 32, shift = cursor % 32;
+        if (cursor + bits > 32 * pixel.words.size()) {
+            is_complete = false;
+            return 0;
+        }
+        std::uint32_t code = pixel.words[word] >> shift;
+        if (shift + bits > 32) code |= pixel.words[word + 1] << (32 - shift);
+        code &= bits == 32 ? ~0u : (1u << bits) - 1u;
+        material.fields.push_back({.value = value, .closure = closure, .frame = frame, .offset = cursor, .bits = bits});
+        material.codes.push_back(code);
+        cursor += bits;
+        return code;
+    };
+    read(StorageValue::pixel_class);
+    const std::uint32_t closures = read(StorageValue::closure_count) + 1, frames = read(StorageValue::frame_count) + 1;
+    const std::uint32_t tangents = read(StorageValue::tangent_flags, frames);
+    if (read(StorageValue::occlusion_flag) != 0) {
+        material.occlusion = library.unpack_unit(read(StorageValue::occlusion), storage_format(StorageValue::occlusion).bits);
+    }
+    for (frame = 0; frame < frames; ++frame) {
+        if (frame > 0) {
+            const std::uint32_t bits = storage_format(StorageValue::normal).bits;
+            material.normals.push_back(decode_direction(read(StorageValue::normal), bits));
+        }
+        const StorageFormat& format = storage_format(StorageValue::tangent);
+        material.tangent_angles.push_back((tangents >> frame & 1u) != 0
+                                              ? decode_number(format, format.bits, read(StorageValue::tangent))
+                                              : 0.0);
+    }
+    frame = 0;
+    for (closure = 0; closure < closures && is_complete; ++closure) {
+        UnpackedClosure result;
+        result.slab = Library::slab_of(Slab{});
+        result.path = library.open_path();
+        const std::uint32_t features = read(StorageValue::features);
+        const auto medium = static_cast<StoredMedium>(read(StorageValue::medium));
+        const bool has_albedo = read(StorageValue::has_albedo) != 0, is_below = read(StorageValue::is_below) != 0;
+        if (frames > 1) result.frame = read(StorageValue::frame);
+        result.medium = medium;
+        result.slab.features = features;
+        result.slab.roughness = pixel.roughness;
+        result.slab.albedo = glm::dvec3(0.0);
+        for_each_closure_field(closure, closures, features, medium, has_albedo, is_below, [&](StorageValue value) {
+            const StorageFormat& format = storage_format(value);
+            const std::uint32_t code = read(value);
+            if (glm::dvec3* color = color_of(result.slab, value)) {
+                *color = library.unpack_color(code);
+            } else if (double* number = number_of(result.slab, value)) {
+                *number = decode_number(format, format.bits, code);
+            } else if (value == StorageValue::specular_lut) {
+                result.slab.specular_lut = code;
+            } else if (value == StorageValue::grey_weight) {
+                result.path.weight = glm::dvec3(decode_number(format, format.bits, code));
+            } else if (value == StorageValue::weight) {
+                result.path.weight = library.unpack_color(code);
+            } else if (value == StorageValue::path_transmittance) {
+                result.path.transmittance = library.unpack_color(code);
+            } else if (value == StorageValue::path_uncovered) {
+                result.path.uncovered = glm::dvec3(decode_number(format, format.bits, code));
+            } else if (value == StorageValue::medium_transmittance) {
+                const glm::dvec3 transmittance = library.unpack_color(code);
+                for (int channel = 0; channel < 3; ++channel) {
+                    result.slab.mean_free_path[channel] =
+                        library.transmittance_to_mean_free_path(transmittance[channel], 1.0);
+                }
+            }
+        });
+        if (medium != StoredMedium::opaque) {
+            result.slab.features |= slab_medium;
+            result.slab.phase_anisotropy = 0.0;
+            result.slab.thickness = 1.0;
+        }
+        if (medium == StoredMedium::subsurface) {
+            for (int channel = 0; channel < 3; ++channel) {
+                result.slab.mean_free_path[channel] =
+                    library.unpack_logarithm(pixel.subsurface >> (8 * channel) & 0xffu, 8, shortest_path,
+                                             std::log2(longest_path / shortest_path));
+            }
+            const std::uint32_t thickness = pixel.subsurface >> 24;
+            result.slab.thickness = thickness == 255 ? std::numeric_limits<double>::infinity()
+                                                     : library.unpack_logarithm(thickness, 8, shortest_path,
+                                                                                std::log2(longest_thickness / shortest_path));
+        }
+        material.closures.push_back(result);
+    }
+    if (!is_complete) {
+        return fail(ErrorCode::invalid_argument, "read stored material", fmt::format("{} words", pixel.words.size()),
+                    "its header asks for more", "Give all words of the pixel, from material.0 on.");
+    }
+    return material;
+}
 
 }  // namespace nacre::materials

@@ -104,8 +104,10 @@ class Printer {
         if ((topology_.features & slab_specular_lut) != 0) print("    slab.specular_lut = {}u;\n", slab.specular_lut);
         if ((topology_.features & slab_glints) != 0) {
             print(
+                "#ifdef NACRE_TREE_GLINT_POSITION\n    slab.glint_position = NACRE_TREE_GLINT_POSITION;\n"
+                "    slab.glint_dx = NACRE_TREE_GLINT_DX;\n    slab.glint_dy = NACRE_TREE_GLINT_DY;\n#else\n"
                 "    slab.glint_position = vec2(0.0);\n    slab.glint_dx = vec2(0.0);\n    slab.glint_dy = "
-                "vec2(0.0);\n");
+                "vec2(0.0);\n#endif\n");
         }
         print("    return slab;\n}}\n");
     }

@@ -27,6 +27,7 @@ struct TreeTexture {
 ///     float tree_parameter(uint index);   // parameters[index]
 ///     vec4 tree_texture(uint index);      // textures[index], filtered as the includer wants
 ///     and what materials/closures/tables.glsl asks for
+///     NACRE_TREE_GLINT_POSITION, _DX and _DY, macros: vec2 (materials/slab.h), where glints have a place
 ///
 /// and offers
 ///

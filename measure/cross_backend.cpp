@@ -4,12 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
+
+#include "measure/closure_comparison.h"
 
 namespace nacre::measure {
 namespace {
@@ -181,10 +184,36 @@ void find_origin(const Contestant& reference, const Contestant& test, BackendRes
     }
 }
 
+// The words of the texels, which say nothing by the fields of the texture, become 0.
+void clear_texels(TextureData& data, const std::vector<bool>& which) {
+    for (std::size_t i = 0; i < which.size() && 4 * (i + 1) <= data.bytes.size(); ++i) {
+        if (which[i]) std::memset(data.bytes.data() + 4 * i, 0, 4);
+    }
+}
+
+Expected<MaterialWords> material_words_of(const Contestant& contestant) {
+    const auto read = [&](const char* name, std::uint32_t layer) -> Expected<TextureData> {
+        auto content = contestant.renderer.read_intermediate(name, layer);
+        if (!content) return std::unexpected(named(content.error(), contestant.backend));
+        return texture_data_of(*std::move(content));
+    };
+    MaterialWords words;
+    NACRE_TRY(words.material_0, read("material.0", 0));
+    NACRE_TRY(words.material_1, read("material.1", 0));
+    for (const IntermediateDescription& description : contestant.renderer.intermediates()) {
+        if (description.name != "material.slices") continue;
+        for (std::uint32_t layer = 0; layer < description.layers; ++layer) {
+            NACRE_TRY(TextureData slice, read("material.slices", layer));
+            words.slices.push_back(std::move(slice));
+        }
+    }
+    return words;
+}
+
 // All layers and mips of one texture on two devices.
 Expected<TextureDifference> compare_texture(const Contestant& reference, const Contestant& test,
                                             const IntermediateDescription& description, bool with_pictures,
-                                            BackendResult& result) {
+                                            const std::vector<bool>& is_closure, BackendResult& result) {
     NumericalError error{.texture = description.name};
     const bool measures_error = is_more_precise(reference, test);
     TextureDifference sum{.name = description.name};
@@ -195,8 +224,11 @@ Expected<TextureDifference> compare_texture(const Contestant& reference, const C
             if (!a) return std::unexpected(named(a.error(), reference.backend));
             auto b = test.renderer.read_intermediate(description.name, layer, mip);
             if (!b) return std::unexpected(named(b.error(), test.backend));
-            const TextureData data_a = texture_data_of(*std::move(a));
-            const TextureData data_b = texture_data_of(*std::move(b));
+            TextureData data_a = texture_data_of(*std::move(a)), data_b = texture_data_of(*std::move(b));
+            if (description.name == "material.0" || description.name == "material.1") {
+                clear_texels(data_a, is_closure);
+                clear_texels(data_b, is_closure);
+            }
             NACRE_TRY(const TextureDifference part, compare_contents(data_a, data_b));
             accumulate(sum, part);
             if (measures_error && data_a.format == data_b.format) {
@@ -226,15 +258,28 @@ Expected<void> compare_all_textures(const Contestant& reference, const Contestan
     const auto readable = [](const std::vector<IntermediateDescription>& list, const std::string& name) {
         return std::ranges::any_of(list, [&](const auto& d) { return d.name == name && d.is_readable; });
     };
+    ClosureDifference closures;
+    const bool has_words = std::ranges::all_of(std::array{"material.0", "material.1"}, [&](const char* name) {
+        return readable(wanted, name) && readable(present, name);
+    });
+    if (has_words) {
+        NACRE_TRY(const MaterialWords words_a, material_words_of(reference));
+        NACRE_TRY(const MaterialWords words_b, material_words_of(test));
+        NACRE_TRY(closures, compare_closures(words_a, words_b));
+    }
     for (const IntermediateDescription& description : wanted) {
         if (!description.is_readable) continue;
         if (!options.only_texture.empty() && description.name != options.only_texture) continue;
+        if (description.name == "material.slices" && has_words && readable(present, description.name)) {
+            result.textures.push_back(closures.difference);
+            continue;
+        }
         if (!readable(present, description.name)) {
             result.missing.push_back(description.name);
             continue;
         }
         NACRE_TRY(TextureDifference difference,
-                  compare_texture(reference, test, description, options.texture_pictures, result));
+                  compare_texture(reference, test, description, options.texture_pictures, closures.is_closure, result));
         result.textures.push_back(std::move(difference));
     }
     for (const IntermediateDescription& description : present) {

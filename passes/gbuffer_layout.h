@@ -14,7 +14,7 @@
 ///     for (const Field& field : fields_of("top_layer"))
 ///         if (field_differs(field, word_a, word_b)) ++differing;
 ///
-/// A pixel is three 32-bit words, 12 bytes: `material.0` and `material.1` (the slab) and `top_layer` (what effects in
+/// A pixel of a plain slab is three 32-bit words, 12 bytes: `material.0` and `material.1` (the slab) and `top_layer` (what effects in
 /// screen space want to know without reading the slab). Reflectances are stored as square roots, so that steps are even
 /// to the eye and decoding is one exact multiplication.
 
@@ -42,6 +42,7 @@ enum class PixelClass : std::uint32_t {
     background = 0,  ///< No surface: the sky is seen.
     slab = 1,        ///< A lit slab.
     unlit = 2,       ///< A color that is shown as it is; only `diffuse` counts.
+    closures = 3,    ///< Several lobes: words are a stream of fields (materials/storage.h) with the class in its place.
 };
 
 /// All fields, by word and shift.

@@ -25,13 +25,18 @@ Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPass
         rhi::CullMode cull;
         bool mirrored;
         std::uint32_t texture_mask;
+        std::uint32_t topology;  // of closures; ~0: none
         auto operator<=>(const Key&) const = default;
     };
     std::map<Key, std::uint32_t> known;
     const auto pipeline_for = [&](const Key& key, const Draw& draw) -> Expected<std::uint32_t> {
         if (const auto found = known.find(key); found != known.end()) return found->second;
         rhi::GraphicsPipelineDesc pipeline;
+        const bool by_closures = key.topology != ~0u;
         std::vector<rhi::ShaderDefine> defines = vertex_defines(key.features);
+        if (by_closures && std::ranges::find(desc.defines, "HAS_POSITIONS", &rhi::ShaderDefine::name) == desc.defines.end()) {
+            defines.push_back({"HAS_POSITIONS"});
+        }
         defines.insert(defines.end(), desc.defines.begin(), desc.defines.end());
         const rhi::ShaderSource vertex{.path = desc.vertex_shader, .defines = std::move(defines)};
         std::optional<rhi::ShaderSource> fragment;
@@ -39,30 +44,41 @@ Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPass
         if (uses_materials_) {
             defines = fragment_defines(key.features);
             defines.insert(defines.end(), desc.defines.begin(), desc.defines.end());
-            fragment = rhi::ShaderSource{.path = desc.fragment_shader, .defines = std::move(defines)};
-            pipeline.bind_group_layouts.push_back(context.materials.layout(draw.material));
+            if (by_closures) defines.insert(defines.end(), desc.closure_defines.begin(), desc.closure_defines.end());
+            const std::string path =
+                by_closures ? fmt::format("{}{}.frag", desc.closure_shader, key.topology) : desc.fragment_shader;
+            fragment = rhi::ShaderSource{.path = path, .defines = std::move(defines)};
+            pipeline.bind_group_layouts.push_back(by_closures ? context.materials.closure_layout(draw.material)
+                                                              : context.materials.layout(draw.material));
+            if (by_closures && desc.closure_layout && context.closures.find(draw.material)->writes_slices()) {
+                pipeline.bind_group_layouts.push_back(desc.closure_layout);
+            }
         }
         SceneGeometry::describe_vertices(key.features.attributes, pipeline);
         pipeline.cull = key.cull;
         pipeline.front_face = key.mirrored ? rhi::FrontFace::clockwise : rhi::FrontFace::counter_clockwise;
         pipeline.depth_stencil = desc.depth_stencil;
-        pipeline.color_targets = desc.color_targets;
+        pipeline.color_targets = by_closures && !desc.closure_color_targets.empty() ? desc.closure_color_targets : desc.color_targets;
         pipeline.name = desc.name;
         NACRE_TRY(const rhi::ReloadableGraphicsPipeline made,
                   context.shaders.graphics_pipeline(desc.name, pipeline, vertex, fragment));
         pipelines_.push_back(made);
+        has_closure_group_.push_back(pipeline.bind_group_layouts.size() > 2);
         return known.emplace(key, static_cast<std::uint32_t>(pipelines_.size() - 1)).first->second;
     };
 
     for (const std::uint32_t index : draws) {
         const Draw& draw = geometry_->draws()[index];
-        ShadingFeatures features = restricted(draw.features, desc.textures, desc.with_normals, desc.with_colors);
+        const bool by_closures = draw.has_closures && !desc.closure_shader.empty();
+        ShadingFeatures features = by_closures ? draw.closure_features
+                                               : restricted(draw.features, desc.textures, desc.with_normals, desc.with_colors);
         if (!desc.keeps_unlit) features.unlit = false;
         const bool culls = desc.culls && !draw.two_faces;
         Key key{features, culls ? rhi::CullMode::back : rhi::CullMode::none,
                 (culls || features.double_sided) && draw.mirrored,
-                uses_materials_ ? context.materials.texture_mask(draw.material) : 0};
-        Item item{.draw = index, .attributes = features.attributes};
+                uses_materials_ && !by_closures ? context.materials.texture_mask(draw.material) : 0,
+                by_closures ? context.closures.find(draw.material)->topology : ~0u};
+        Item item{.draw = index, .attributes = features.attributes, .by_closures = by_closures};
         const bool sorted_faces = keep_order && draw.two_faces && draw.topology == scene::Topology::triangle_list;
         if (sorted_faces) {
             // Far faces of a closed transparent body first, then the near ones.
@@ -84,25 +100,27 @@ Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPass
 
 void GeometryDraws::record_item(rhi::CommandList& list, const Item& item, rhi::BindGroup frame_group,
                                 std::uint32_t pipeline, std::uint32_t& bound_pipeline,
-                                std::uint32_t& bound_material) const {
+                                std::uint32_t& bound_material, rhi::BindGroup closure_group) const {
     const Draw& draw = geometry_->draws()[item.draw];
     if (pipeline != bound_pipeline) {
         list.set_pipeline(shaders_->get(pipelines_[pipeline]));
         list.set_bind_group(0, frame_group);
+        if (has_closure_group_[pipeline]) list.set_bind_group(2, closure_group);
         bound_pipeline = pipeline;
         bound_material = ~0u;
     }
     if (uses_materials_ && draw.material != bound_material) {
-        list.set_bind_group(1, materials_->group(draw.material));
+        list.set_bind_group(1, item.by_closures ? materials_->closure_group(draw.material) : materials_->group(draw.material));
         bound_material = draw.material;
     }
     geometry_->record(list, draw, item.attributes);
 }
 
-void GeometryDraws::record(rhi::CommandList& list, rhi::BindGroup frame_group, const std::vector<bool>& visible) const {
+void GeometryDraws::record(rhi::CommandList& list, rhi::BindGroup frame_group, const std::vector<bool>& visible,
+                           rhi::BindGroup closure_group) const {
     std::uint32_t pipeline = ~0u, material = ~0u;
     for (const Item& item : items_) {
-        if (visible[item.draw]) record_item(list, item, frame_group, item.pipeline, pipeline, material);
+        if (visible[item.draw]) record_item(list, item, frame_group, item.pipeline, pipeline, material, closure_group);
     }
 }
 
@@ -126,13 +144,16 @@ void uses_geometry(PassDeclaration& pass, const RenderContext& context, const Ge
     std::map<std::uint32_t, std::vector<std::uint32_t>> attribute_readers, texture_readers;
     for (const std::uint32_t index : draws) {
         const Draw& draw = context.geometry.draws()[index];
+        const bool by_closures = draw.has_closures && !desc.closure_shader.empty();
         const std::uint32_t attributes =
-            restricted(draw.features, desc.textures, desc.with_normals, desc.with_colors).attributes;
+            by_closures ? draw.closure_features.attributes
+                        : restricted(draw.features, desc.textures, desc.with_normals, desc.with_colors).attributes;
         for (std::uint32_t a = 0; a < attribute_count; ++a) {
             if ((attributes & (1u << a)) != 0) attribute_readers[a].push_back(index);
         }
         if (desc.fragment_shader.empty()) continue;
-        for (const std::uint32_t texture : context.materials.textures_of(draw.material)) {
+        for (const std::uint32_t texture : by_closures ? context.materials.closure_textures_of(draw.material)
+                                                       : context.materials.textures_of(draw.material)) {
             texture_readers[texture].push_back(index);
         }
     }

@@ -26,6 +26,7 @@ namespace nacre::passes {
 
 /// What the scene, the profile and the device come to. Everything that is false here costs nothing.
 struct Decisions {
+    bool closures = false;               ///< Some deferred surface is stored as closures.
     bool draws_opaque = false, alpha_test = false, blend = false, unlit = false, slab = false;
     bool emission = false;               ///< Some deferred surface emits light.
     bool packed_targets = false;         ///< Emission and blending go through integer targets.
@@ -46,6 +47,7 @@ struct FrameResources {
     TextureId depth, material_0, material_1, top_layer, emission, shadow_maps, lit, tile_classes, final_color;
     BufferId tile_lists, tiles, tile_lists_start, exposure, camera, lights, shadow_cameras, materials, irradiance;
     TextureId environment, albedo_table;
+    TextureId material_slices;                   ///< Words of stored closures beyond the second.
     std::vector<BufferId> geometry;              ///< As SceneGeometry::buffers().
     std::vector<TextureId> material_textures;    ///< As SceneMaterials::textures().
 };
@@ -56,6 +58,7 @@ struct RenderContext {
     ShaderLibrary& shaders;
     const SceneGeometry& geometry;
     const SceneMaterials& materials;
+    const SceneClosures& closures;
     const Profile& profile;
     const Decisions& decisions;
     FrameResources& resources;
@@ -95,6 +98,12 @@ struct GeometryPassDesc {
     rhi::DepthStencilState depth_stencil;
     std::vector<rhi::ColorTargetState> color_targets;
     rhi::BindGroupLayout frame_layout;      ///< Of set 0.
+    /// Fragment shader of materials that are shaded by closures: "passes/closures/base_pass_" for base_pass_N.frag, N the
+    /// topology. Empty: the pass draws them as plain slabs.
+    std::string closure_shader;
+    std::vector<rhi::ShaderDefine> closure_defines;           ///< For those shaders alone.
+    std::vector<rhi::ColorTargetState> closure_color_targets; ///< Of those shaders; empty: as color_targets.
+    rhi::BindGroupLayout closure_layout{};  ///< Of set 2 of those shaders, where they write slices of material words.
     bool culls = true;                      ///< Back faces of one-sided materials are not drawn.
 };
 
@@ -108,8 +117,9 @@ class GeometryDraws {
     /// `draws`: indices into the geometry's draws; their order is kept when `keep_order`.
     Expected<void> prepare(RenderContext& context, const GeometryPassDesc& desc, std::vector<std::uint32_t> draws,
                            bool keep_order = false);
-    /// Records the draws that are visible (by index of the geometry's draws). The group is that of set 0.
-    void record(rhi::CommandList& list, rhi::BindGroup frame_group, const std::vector<bool>& visible) const;
+    /// Records the draws that are visible (by index of the geometry's draws). The groups are those of sets 0 and 2.
+    void record(rhi::CommandList& list, rhi::BindGroup frame_group, const std::vector<bool>& visible,
+                rhi::BindGroup closure_group = {}) const;
     void record_one(rhi::CommandList& list, rhi::BindGroup frame_group, std::uint32_t draw, bool back_faces) const;
     [[nodiscard]] std::uint64_t size() const { return items_.size(); }
 
@@ -119,15 +129,17 @@ class GeometryDraws {
         std::uint32_t pipeline = 0;
         std::uint32_t back_pipeline = ~0u;
         std::uint32_t attributes = 0;
+        bool by_closures = false;
     };
     void record_item(rhi::CommandList& list, const Item& item, rhi::BindGroup frame_group, std::uint32_t pipeline,
-                     std::uint32_t& bound_pipeline, std::uint32_t& bound_material) const;
+                     std::uint32_t& bound_pipeline, std::uint32_t& bound_material, rhi::BindGroup closure_group = {}) const;
 
     const ShaderLibrary* shaders_ = nullptr;
     const SceneGeometry* geometry_ = nullptr;
     const SceneMaterials* materials_ = nullptr;
     bool uses_materials_ = false;
     std::vector<rhi::ReloadableGraphicsPipeline> pipelines_;
+    std::vector<bool> has_closure_group_;
     std::vector<Item> items_;
 };
 
@@ -160,6 +172,8 @@ std::vector<FrameUse> lighting_uses(const FrameResources& resources);
 void uses_lighting(PassDeclaration& pass, const FrameResources& resources);
 /// Defines of passes/shared/lighting.glsl.
 std::vector<rhi::ShaderDefine> lighting_defines(const Decisions& decisions);
+/// Lists of tiles (passes/tile_classification/tiles.glsl), 16 bytes of arguments each.
+[[nodiscard]] constexpr std::uint32_t tile_list_count(bool closures) { return closures ? 5 : 4; }
 /// LIT_FORMAT.
 rhi::ShaderDefine lit_format_define(const Decisions& decisions);
 

@@ -118,6 +118,7 @@ struct Renderer::State {
     bool handles_made = false;
 
     std::unique_ptr<ShaderLibrary> shaders;
+    SceneClosures closures;
     std::unique_ptr<SceneGeometry> geometry;
     std::unique_ptr<SceneMaterials> materials;
     std::unique_ptr<PreparedEnvironment> environment;
@@ -178,7 +179,11 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
 
     const auto slabs = make_slabs(scene, options.without);
     const bool colors = !has(options.without, Feature::vertex_colors);
-    NACRE_TRY(geometry, SceneGeometry::create(device, scene, slabs, all_textures, colors));
+    if (!has(options.without, Feature::closures)) {
+        NACRE_TRY(closures, SceneClosures::choose(scene, *profile, profile->storage_in_fragment && capabilities.storage_in_fragment,
+                                                  warnings));
+    }
+    NACRE_TRY(geometry, SceneGeometry::create(device, scene, slabs, closures, all_textures, colors));
     std::vector<bool> used(slabs.size());
     std::uint32_t textures = 0;
     std::uint32_t blended = 0;
@@ -196,12 +201,14 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
         decisions.alpha_test |= draw.alpha_mode == materials::AlphaMode::mask;
         decisions.draws_opaque = true;
         decisions.emission |= draw.features.emits;
+        decisions.closures |= draw.has_closures && closures.find(draw.material)->layout.storage_class !=
+                                                       materials::StorageClass::simple;
         (draw.features.unlit ? decisions.unlit : decisions.slab) = true;
     }
     const float anisotropy = capabilities.anisotropic_filtering
                                  ? std::min(static_cast<float>(profile->texture_anisotropy), capabilities.max_anisotropy)
                                  : 1.0f;
-    NACRE_TRY(materials, SceneMaterials::create(device, scene, slabs, used, all_textures, anisotropy));
+    NACRE_TRY(materials, SceneMaterials::create(device, scene, slabs, closures, used, all_textures, anisotropy));
 
     // Float targets, where the profile wants them and the device has them.
     const bool wants_32 = profile->float32_lit_color;
@@ -244,6 +251,8 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
     leave_out(decisions.emission, "stencil prepass, emission pass, stencil part of the depth target", "no surface emits light");
     leave_out(decisions.blend, "blend pass", "no material has alpha mode BLEND");
     leave_out(decisions.unlit, "lighting shaders for unlit and mixed tiles", "no surface is unlit");
+    leave_out(decisions.closures, "lighting shader for closures, slices of material words",
+              "no deferred surface has more than one plain slab");
     leave_out(decisions.slab, "lighting shader for slabs", "no deferred surface is lit");
     leave_out(decisions.light_capacity > 0, "light list", "no light reaches a lit surface");
     leave_out(decisions.shadow_view_count > 0, "shadow maps", "no light casts shadows on a lit surface");
@@ -267,7 +276,7 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
 /// What several passes read: camera, lights, tables, environment.
 Expected<void> Renderer::State::make_shared_objects(const scene::Scene& scene) {
     handles_made = true;
-    shaders = std::make_unique<ShaderLibrary>(device, options.cache, options.shader_folder);
+    shaders = std::make_unique<ShaderLibrary>(device, options.cache, options.shader_folder, closures.files());
     const scene::Environment& sky = options.environment != nullptr ? *options.environment : scene.environment;
     NACRE_TRY(environment, PreparedEnvironment::create(device, *shaders, sky, profile->environment_size,
                                                        profile->environment_samples));
@@ -324,8 +333,8 @@ Expected<void> Renderer::State::make_shared_objects(const scene::Scene& scene) {
     const float exposure_values[4] = {multiplier, 0.0f, 0.0f, 0.0f};
     NACRE_CHECK(device.write_buffer(exposure, std::as_bytes(std::span(exposure_values))));
     // Arguments of empty dispatches: 0 x 0 x 1 groups, and the length 0.
-    constexpr std::uint32_t no_groups[16] = {0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0};
-    const rhi::BufferDesc start_desc{.size = sizeof(no_groups),
+    const std::vector<glm::uvec4> no_groups(tile_list_count(decisions.closures), glm::uvec4(0, 0, 1, 0));
+    const rhi::BufferDesc start_desc{.size = no_groups.size() * sizeof(glm::uvec4),
                                      .usage = rhi::BufferUsage::copy_source | rhi::BufferUsage::copy_destination,
                                      .name = "empty tile lists"};
     NACRE_TRY(tile_lists_start, device.create_buffer(start_desc));
@@ -376,7 +385,7 @@ Expected<void> Renderer::State::make_shared_objects(const scene::Scene& scene) {
 }
 
 Expected<void> Renderer::State::make_passes() {
-    context = std::make_unique<RenderContext>(RenderContext{device, graph, *shaders, *geometry, *materials, *profile,
+    context = std::make_unique<RenderContext>(RenderContext{device, graph, *shaders, *geometry, *materials, closures, *profile,
                                                             decisions, resources});
     context->width = options.width;
     context->height = options.height;
@@ -397,6 +406,9 @@ Expected<void> Renderer::State::make_passes() {
     resources.material_0 = add_target("material.0", rhi::Format::r32_uint);
     resources.material_1 = add_target("material.1", rhi::Format::r32_uint);
     resources.top_layer = add_target("top_layer", rhi::Format::r32_uint);
+    if (decisions.closures && closures.lighting().slices > 0) {
+        resources.material_slices = add_target("material.slices", rhi::Format::r32_uint, closures.lighting().slices);
+    }
     if (decisions.emission && decisions.packed_targets) resources.emission = add_target("emission", rhi::Format::r32_uint);
     if (keeps_classes) {
         resources.tile_classes = graph.add_texture(
@@ -404,8 +416,9 @@ Expected<void> Renderer::State::make_passes() {
     }
     resources.lit = add_target("lit", decisions.lit_format);
     resources.final_color = add_target("final", rhi::Format::rgba8_unorm);
-    resources.tile_lists = graph.add_buffer({.size = 64, .name = "tile lists"});
-    resources.tiles = graph.add_buffer({.size = std::uint64_t{4} * 4 * tiles_x * tiles_y, .name = "tiles"});
+    const std::uint64_t list_count = tile_list_count(decisions.closures);
+    resources.tile_lists = graph.add_buffer({.size = 16 * list_count, .name = "tile lists"});
+    resources.tiles = graph.add_buffer({.size = 4 * list_count * tiles_x * tiles_y, .name = "tiles"});
 
     // The group of set 0 needs the shadow maps, which the graph makes; passes take it from the context in `prepare`.
     if (decisions.shadow_view_count > 0) passes.push_back(make_shadow_maps(*context, shadow_groups, light_setup.shadow_views));
@@ -463,7 +476,7 @@ void Renderer::State::make_plan(const scene::Scene& scene) {
     plan.width = options.width;
     plan.height = options.height;
     plan.left_out = left_out;
-    plan.gbuffer_bytes_per_pixel = 12;
+    plan.gbuffer_bytes_per_pixel = 12 + (decisions.closures ? 4 * closures.lighting().slices : 0);
     plan.geometry_bytes = geometry->bytes();
     plan.texture_bytes = materials->texture_bytes();
     plan.transient_bytes = graph.transient_bytes();

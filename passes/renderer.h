@@ -49,6 +49,7 @@ enum class Feature : std::uint32_t {
     emission = 1u << 0, alpha_test = 1u << 1, blend = 1u << 2, unlit = 1u << 3, shadows = 1u << 4,
     lights = 1u << 5, normal_maps = 1u << 6, occlusion = 1u << 7, vertex_colors = 1u << 8,
     texture_transforms = 1u << 9, specular_textures = 1u << 10, automatic_exposure = 1u << 11,
+    closures = 1u << 12,  ///< Materials of several lobes; without it they are plain slabs.
 };
 constexpr Feature operator|(Feature a, Feature b) {
     return static_cast<Feature>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));

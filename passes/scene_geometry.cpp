@@ -89,6 +89,7 @@ void append_rows(std::vector<std::byte>& to, const glm::mat4& world) {
 
 Expected<std::unique_ptr<SceneGeometry>> SceneGeometry::create(rhi::Device& device, const scene::Scene& scene,
                                                                const std::vector<materials::SingleSlab>& slabs,
+                                                               const SceneClosures& closures,
                                                                std::uint32_t allowed_textures, bool with_colors) {
     auto result = std::unique_ptr<SceneGeometry>(new SceneGeometry(device));
     std::array<std::vector<std::byte>, attribute_count> attributes;
@@ -115,6 +116,12 @@ Expected<std::unique_ptr<SceneGeometry>> SceneGeometry::create(rhi::Device& devi
                 draw.topology = primitive.topology;
                 draw.two_faces = slab.double_sided || primitive.topology != scene::Topology::triangle_list;
                 draw.alpha_mode = slab.alpha_mode;
+                const ClosureMaterial* closure_material = closures.find(primitive.material);
+                if (closure_material != nullptr && !primitive.normals.empty()) {
+                    draw.has_closures = true;
+                    draw.closure_features = SceneClosures::features_of(*closure_material, primitive, slab.double_sided);
+                    if (closure_material->is_translucent) draw.alpha_mode = materials::AlphaMode::blend;
+                }
                 draw.index_offset = indices.size();
                 Rectangles rectangles;
                 if (draw.features.thin) rectangles = rectangles_of(primitive);
@@ -122,7 +129,7 @@ Expected<std::unique_ptr<SceneGeometry>> SceneGeometry::create(rhi::Device& devi
                 draw.index_count = static_cast<std::uint32_t>(drawn.indices.size());
                 append(indices, std::as_bytes(std::span(drawn.indices)));
                 for (std::uint32_t a = 0; a < attribute_count; ++a) {
-                    if ((draw.features.attributes & (1u << a)) == 0) continue;
+                    if (((draw.features.attributes | draw.closure_features.attributes) & (1u << a)) == 0) continue;
                     draw.attribute_offsets[a] = attributes[a].size();
                     append(attributes[a], static_cast<Attribute>(a) == Attribute::corner
                                               ? std::as_bytes(std::span(rectangles.corners))

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "passes/scene_closures.h"
 #include "passes/shading_features.h"
 #include "rhi/device.h"
 #include "scene/scene.h"
@@ -14,7 +15,7 @@
 /// The geometry of a scene on a device: one buffer for each vertex attribute that something needs, one for indices and one
 /// for the places of instances; and the list of what is to be drawn.
 ///
-///     NACRE_TRY(auto geometry, SceneGeometry::create(device, scene, slabs));
+///     NACRE_TRY(auto geometry, SceneGeometry::create(device, scene, slabs, closures, all_textures, true));
 ///     for (const Draw& draw : geometry->draws()) geometry->record(list, draw, attributes);
 
 namespace nacre::passes {
@@ -23,6 +24,8 @@ namespace nacre::passes {
 struct Draw {
     std::uint32_t material = 0;
     ShadingFeatures features;
+    ShadingFeatures closure_features;  ///< Where the material is shaded by closures.
+    bool has_closures = false;
     scene::Topology topology = scene::Topology::triangle_list;
     bool mirrored = false;      ///< Front faces wind clockwise.
     bool two_faces = false;     ///< Back faces are drawn too.
@@ -40,6 +43,7 @@ class SceneGeometry {
     /// Uploads what the draws of the scene need. `slabs` has one entry for each material.
     static Expected<std::unique_ptr<SceneGeometry>> create(rhi::Device& device, const scene::Scene& scene,
                                                            const std::vector<materials::SingleSlab>& slabs,
+                                                           const SceneClosures& closures,
                                                            std::uint32_t allowed_textures, bool with_colors);
     ~SceneGeometry();
     SceneGeometry(const SceneGeometry&) = delete;

@@ -7,6 +7,9 @@
 #include <cstring>
 #include <fmt/format.h>
 
+#include "materials/tables/anisotropy_table.h"
+#include "materials/tables/interface_table.h"
+#include "materials/tables/medium_table.h"
 #include "passes/frame_graph.h"
 
 namespace nacre::passes {
@@ -83,8 +86,86 @@ Expected<rhi::Sampler> SceneMaterials::make_sampler(const scene::Sampler& sample
     return device_.create_sampler(desc);
 }
 
+Expected<rhi::Sampler> SceneMaterials::sampler_of(const scene::Scene& scene, int index, float anisotropy) {
+    if (!samplers_.contains(index)) {
+        const scene::Sampler sampler = index >= 0 ? scene.samplers[static_cast<std::size_t>(index)] : scene::Sampler{};
+        NACRE_TRY(samplers_[index], make_sampler(sampler, anisotropy));
+    }
+    return samplers_[index];
+}
+
+Expected<void> SceneMaterials::upload_tables(std::uint32_t tables) {
+    if (tables == 0) return {};
+    const std::span<const std::uint16_t> contents[closure_table_count] = {
+        materials::interface_table(), materials::medium_table(), materials::anisotropy_table()};
+    constexpr const char* names[closure_table_count] = {"interface table", "medium table", "anisotropy table"};
+    NACRE_TRY(table_sampler_, device_.create_sampler({.magnify = rhi::Filter::nearest,
+                                                      .minify = rhi::Filter::nearest,
+                                                      .mip = rhi::Filter::nearest,
+                                                      .address_u = rhi::AddressMode::clamp_to_edge,
+                                                      .address_v = rhi::AddressMode::clamp_to_edge,
+                                                      .address_w = rhi::AddressMode::clamp_to_edge,
+                                                      .name = "table"}));
+    for (std::uint32_t i = 0; i < closure_table_count; ++i) {
+        if ((tables & (1u << i)) == 0) continue;
+        // As materials/closures/table_textures.glsl reads them: two 16-bit words in a texel, 128 texels in a row.
+        constexpr std::uint32_t width = 128;
+        const std::size_t texels = contents[i].size() / 2, rows = (texels + width - 1) / width;
+        std::vector<std::uint32_t> words(width * rows);
+        std::memcpy(words.data(), contents[i].data(), contents[i].size_bytes());
+        const rhi::TextureDesc desc{.format = rhi::Format::r32_uint,
+                                    .width = width,
+                                    .height = static_cast<std::uint32_t>(rows),
+                                    .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::copy_destination,
+                                    .name = names[i]};
+        NACRE_TRY(tables_[i], device_.create_texture(desc));
+        table_places_[i] = static_cast<std::uint32_t>(all_textures_.size());
+        all_textures_.push_back(tables_[i]);
+        NACRE_CHECK(device_.write_texture(tables_[i], std::as_bytes(std::span(words))));
+    }
+    return {};
+}
+
+Expected<void> SceneMaterials::add_closures(const scene::Scene& scene, std::uint32_t material,
+                                            const ClosureMaterial& closures, std::uint64_t block_offset,
+                                            float anisotropy) {
+    Closures& result = closures_[material];
+    std::vector<rhi::BindingLayout> bindings = {
+        {.binding = 0, .type = rhi::BindingType::uniform_buffer, .stages = rhi::ShaderStage::fragment}};
+    std::vector<rhi::BindGroupEntry> entries = {{.binding = 0,
+                                                 .buffer = block_,
+                                                 .offset = block_offset,
+                                                 .size = closures.numbers.size() * sizeof(glm::vec4)}};
+    const auto add = [&](std::uint32_t binding, rhi::Texture texture, rhi::Sampler sampler) {
+        bindings.push_back({.binding = binding,
+                            .type = rhi::BindingType::combined_texture_sampler,
+                            .stages = rhi::ShaderStage::fragment});
+        entries.push_back({.binding = binding, .texture = texture, .sampler = sampler});
+        const auto place = std::ranges::find(all_textures_, texture) - all_textures_.begin();
+        result.textures.push_back(static_cast<std::uint32_t>(place));
+    };
+    constexpr std::uint32_t needed_by[closure_table_count] = {~0u, materials::slab_medium, materials::slab_anisotropy};
+    for (std::uint32_t i = 0; i < closure_table_count; ++i) {
+        if (i == 0 || (closures.features & needed_by[i]) != 0) add(1 + i, tables_[i], table_sampler_);
+    }
+    for (std::uint32_t i = 0; i < closures.textures.size(); ++i) {
+        const materials::TextureReference& reference = closures.textures[i];
+        const bool has_mips = reference.sampler < 0 || scene.samplers[static_cast<std::size_t>(reference.sampler)].mip !=
+                                                           scene::MipFilter::none;
+        NACRE_TRY(const rhi::Texture texture, upload_image(scene, reference.image, has_mips));
+        NACRE_TRY(const rhi::Sampler sampler, sampler_of(scene, reference.sampler, anisotropy));
+        add(first_closure_texture + i, texture, sampler);
+    }
+    NACRE_TRY(result.layout, device_.create_bind_group_layout({.bindings = bindings, .name = "closures"}));
+    NACRE_TRY(result.group, device_.create_bind_group({.layout = result.layout,
+                                                       .entries = entries,
+                                                       .name = fmt::format("closures of material {}", material)}));
+    return {};
+}
+
 Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& device, const scene::Scene& scene,
                                                                  const std::vector<materials::SingleSlab>& slabs,
+                                                                 const SceneClosures& closures,
                                                                  const std::vector<bool>& used,
                                                                  std::uint32_t allowed_textures, float anisotropy) {
     auto result = std::unique_ptr<SceneMaterials>(new SceneMaterials(device));
@@ -92,6 +173,7 @@ Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& de
     result->layouts_.resize(slabs.size());
     result->texture_masks_.resize(slabs.size());
     result->textures_of_.resize(slabs.size());
+    result->closures_.resize(slabs.size());
     if (slabs.empty()) return result;
 
     const std::uint64_t alignment = std::max(device.capabilities().uniform_offset_alignment, 16u);
@@ -109,13 +191,26 @@ Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& de
         }
         std::memcpy(blocks.data() + stride * i, &block, sizeof(block));
     }
+    std::vector<std::uint64_t> closure_offsets(slabs.size());
+    for (std::uint32_t i = 0; i < slabs.size(); ++i) {
+        const ClosureMaterial* material = closures.find(i);
+        if (material == nullptr) continue;
+        closure_offsets[i] = blocks.size();
+        const std::uint64_t size = material->numbers.size() * sizeof(glm::vec4);
+        blocks.resize(blocks.size() + (size + alignment - 1) / alignment * alignment);
+        std::memcpy(blocks.data() + closure_offsets[i], material->numbers.data(), size);
+    }
     NACRE_TRY(result->block_, device.create_buffer({.size = blocks.size(),
                                                     .usage = rhi::BufferUsage::uniform | rhi::BufferUsage::copy_destination,
                                                     .name = "materials"}));
     NACRE_CHECK(device.write_buffer(result->block_, std::span<const std::byte>(blocks)));
 
+    NACRE_CHECK(result->upload_tables(closures.tables()));
     for (std::uint32_t i = 0; i < slabs.size(); ++i) {
         if (!used[i]) continue;
+        if (const ClosureMaterial* material = closures.find(i)) {
+            NACRE_CHECK(result->add_closures(scene, i, *material, closure_offsets[i], anisotropy));
+        }
         std::vector<rhi::BindingLayout> bindings = {
             {.binding = 0, .type = rhi::BindingType::uniform_buffer, .stages = rhi::ShaderStage::fragment}};
         std::vector<rhi::BindGroupEntry> entries = {
@@ -128,13 +223,11 @@ Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& de
                                                : scene::Sampler{};
             NACRE_TRY(const rhi::Texture texture,
                       result->upload_image(scene, reference.image, sampler.mip != scene::MipFilter::none));
-            if (!result->samplers_.contains(reference.sampler)) {
-                NACRE_TRY(result->samplers_[reference.sampler], result->make_sampler(sampler, anisotropy));
-            }
             bindings.push_back({.binding = slot + 1,
                                 .type = rhi::BindingType::combined_texture_sampler,
                                 .stages = rhi::ShaderStage::fragment});
-            entries.push_back({.binding = slot + 1, .texture = texture, .sampler = result->samplers_[reference.sampler]});
+            NACRE_TRY(const rhi::Sampler texture_sampler, result->sampler_of(scene, reference.sampler, anisotropy));
+            entries.push_back({.binding = slot + 1, .texture = texture, .sampler = texture_sampler});
             result->texture_masks_[i] |= 1u << slot;
             result->textures_of_[i].push_back(
                 static_cast<std::uint32_t>(std::ranges::find(result->all_textures_, texture) - result->all_textures_.begin()));
@@ -156,6 +249,10 @@ SceneMaterials::~SceneMaterials() {
     for (const rhi::BindGroup group : groups_) {
         if (group) device_.destroy(group);
     }
+    for (const Closures& closures : closures_) {
+        if (closures.group) device_.destroy(closures.group);
+    }
+    if (table_sampler_) device_.destroy(table_sampler_);
     for (const rhi::Texture texture : all_textures_) device_.destroy(texture);
     for (const auto& [index, sampler] : samplers_) device_.destroy(sampler);
     if (block_) device_.destroy(block_);

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <vector>
 
 #include "core/error.h"
 #include "materials/single_slab.h"
+#include "passes/scene_closures.h"
 #include "passes/shading_features.h"
 #include "rhi/device.h"
 #include "scene/scene.h"
@@ -24,6 +26,7 @@ class SceneMaterials {
     /// Uploads the slabs' numbers and those textures that are in `allowed_textures` (texture_bit).
     static Expected<std::unique_ptr<SceneMaterials>> create(rhi::Device& device, const scene::Scene& scene,
                                                             const std::vector<materials::SingleSlab>& slabs,
+                                                            const SceneClosures& closures,
                                                             const std::vector<bool>& used,
                                                             std::uint32_t allowed_textures, float anisotropy);
     ~SceneMaterials();
@@ -34,6 +37,17 @@ class SceneMaterials {
     [[nodiscard]] rhi::BindGroupLayout layout(std::uint32_t material) const { return layouts_[material]; }
     /// Number of the layout of a material: materials with the same set of textures have the same one.
     [[nodiscard]] std::uint32_t texture_mask(std::uint32_t material) const { return texture_masks_[material]; }
+
+    /// The same for materials that are shaded by closures.
+    [[nodiscard]] rhi::BindGroup closure_group(std::uint32_t material) const { return closures_[material].group; }
+    [[nodiscard]] rhi::BindGroupLayout closure_layout(std::uint32_t material) const { return closures_[material].layout; }
+    [[nodiscard]] const std::vector<std::uint32_t>& closure_textures_of(std::uint32_t material) const {
+        return closures_[material].textures;
+    }
+    /// The tables of the closures, by number (closure_table_count), and their places in textures(); those that no material
+    /// reads are not there.
+    [[nodiscard]] rhi::Texture table(std::uint32_t number) const { return tables_[number]; }
+    [[nodiscard]] std::uint32_t table_place(std::uint32_t number) const { return table_places_[number]; }
 
     [[nodiscard]] rhi::Buffer block() const { return block_; }
     /// All textures, and which of them (by position) a material reads; for the statements of passes.
@@ -48,7 +62,21 @@ class SceneMaterials {
     Expected<rhi::Texture> upload_image(const scene::Scene& scene, int image, bool with_mips);
     Expected<rhi::Sampler> make_sampler(const scene::Sampler& sampler, float anisotropy);
 
+    Expected<void> upload_tables(std::uint32_t tables);
+    Expected<void> add_closures(const scene::Scene& scene, std::uint32_t material, const ClosureMaterial& closures,
+                                std::uint64_t block_offset, float anisotropy);
+    Expected<rhi::Sampler> sampler_of(const scene::Scene& scene, int index, float anisotropy);
+
+    struct Closures {
+        rhi::BindGroup group{};
+        rhi::BindGroupLayout layout{};
+        std::vector<std::uint32_t> textures;
+    };
     rhi::Device& device_;
+    std::vector<Closures> closures_;
+    std::array<rhi::Texture, closure_table_count> tables_{};
+    std::array<std::uint32_t, closure_table_count> table_places_{};
+    rhi::Sampler table_sampler_{};
     rhi::Buffer block_{};
     std::map<std::pair<int, bool>, rhi::Texture> textures_;
     std::map<int, rhi::Sampler> samplers_;

@@ -7,6 +7,8 @@
 #include <array>
 
 #include "core/hash.h"
+#include "materials/slab.h"
+#include "materials/storage_shader.h"
 #include "passes/gbuffer_layout.h"
 #include "passes/renderer.h"
 
@@ -28,10 +30,13 @@ std::string key_of(const rhi::ShaderSource& source) {
 
 }  // namespace
 
-ShaderLibrary::ShaderLibrary(rhi::Device& device, DiskCache* cache, std::filesystem::path folder)
+ShaderLibrary::ShaderLibrary(rhi::Device& device, DiskCache* cache, std::filesystem::path folder,
+                             std::vector<EmbeddedFile> made)
     : device_(device),
+      made_(std::move(made)),
       compiler_(
-          {.embedded = {embedded_files(), generated_files()}, .source_folder = std::move(folder), .cache = cache}),
+          {.embedded = {embedded_files(), generated_files(), materials::embedded_files(), materials::storage_reader_files(), made_},
+           .source_folder = std::move(folder), .cache = cache}),
       pipelines_(device, compiler_) {}
 
 ShaderLibrary::~ShaderLibrary() {

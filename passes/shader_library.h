@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/embedded_file.h"
 #include "core/error.h"
 #include "passes/plan.h"
 #include "rhi/device.h"
@@ -26,7 +27,9 @@ namespace nacre::passes {
 class ShaderLibrary {
   public:
     /// Files come from `folder` where it has them, else from the program; empty: that of NACRE_SHADER_DIR, if any.
-    ShaderLibrary(rhi::Device& device, DiskCache* cache, std::filesystem::path folder = {});
+    /// `made` are files made for this renderer; they outlive the library.
+    ShaderLibrary(rhi::Device& device, DiskCache* cache, std::filesystem::path folder = {},
+                  std::vector<EmbeddedFile> made = {});
     ~ShaderLibrary();
     ShaderLibrary(const ShaderLibrary&) = delete;
     ShaderLibrary& operator=(const ShaderLibrary&) = delete;
@@ -66,6 +69,7 @@ class ShaderLibrary {
     Expected<rhi::ShaderDesc> compile(const std::string& pass, const rhi::ShaderSource& source);
 
     rhi::Device& device_;
+    std::vector<EmbeddedFile> made_;
     rhi::ShaderCompiler compiler_;
     rhi::PipelineReloader pipelines_;
     std::map<std::string, Once> once_;

@@ -10,8 +10,11 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
 
+#include "materials/builtin_materials.h"
+#include "materials/tree.h"
 #include "scene/environment.h"
 #include "scene/shapes.h"
+#include "scene/tangents.h"
 
 namespace nacre::scene {
 namespace {
@@ -118,6 +121,37 @@ Scene spheres_scene() {
     spot.color = {1.0f, 0.8f, 0.6f};
     scene.lights.push_back(spot);
     scene.cameras.push_back(camera_at({0.0f, 3.4f, 9.2f}, {0.0f, 2.35f, 0.0f}, 38.0f));
+    return scene;
+}
+
+/// Balls of built-in materials (materials/builtin_materials.h).
+Scene materials_scene() {
+    constexpr std::string_view names[] = {"silks-under-plastic", "jade-in-gold", "wet-skin",      "coated-carbon",
+                                          "dusty-car-paint",     "single-fuzz",  "complex-aniso", "complex-coat"};
+    constexpr int columns = 4;
+    Scene scene;
+    Primitive ball = sphere(0.45f, 96, 48);
+    const std::vector<glm::vec2> uv = ball.uv0;
+    add_tangents(ball, uv);
+    for (int i = 0; i < static_cast<int>(std::size(names)); ++i) {
+        auto tree = materials::make_builtin_material(names[i]);
+        if (!tree) continue;
+        MaterialDescription material = dielectric(std::string(names[i]), glm::vec3(0.5f), 0.5f);
+        material.tree = std::make_shared<const materials::Tree>(*std::move(tree));
+        const std::uint32_t index = add_material(scene, std::move(material));
+        const glm::vec3 position(static_cast<float>(i % columns) - 0.5f * (columns - 1), 1.5f - static_cast<float>(i / columns),
+                                 0.0f);
+        place(scene, std::string(names[i]), ball, index, moved_to(position));
+    }
+    const std::uint32_t floor = add_material(scene, dielectric("floor", {0.35f, 0.36f, 0.38f}, 0.6f));
+    place(scene, "floor", parallelogram({-12, 0, 8}, {24, 0, 0}, {0, 0, -16}), floor);
+    Light sun{.name = "sun", .kind = LightKind::directional, .intensity = 1.5f};
+    sun.direction = glm::normalize(glm::vec3(-0.5f, -1.0f, -0.7f));
+    scene.lights.push_back(sun);
+    Light spot = spot_at("spot", {3.0f, 4.0f, 4.0f}, {0.0f, 1.0f, 0.0f}, 30.0f, 30.0f);
+    spot.color = {1.0f, 0.85f, 0.7f};
+    scene.lights.push_back(spot);
+    scene.cameras.push_back(camera_at({0.0f, 1.7f, 5.4f}, {0.0f, 1.0f, 0.0f}, 32.0f));
     return scene;
 }
 
@@ -324,6 +358,7 @@ static constexpr BuiltinScene builtin_scenes[] = {
     {"builtin:cornell", "The Cornell box with two blocks, a copper and a glossy ball.", cornell_scene},
     {"builtin:grid250k", "A landscape of 250,632 triangles in 16 meshes under a sun.", grid_scene},
     {"builtin:alpha", "Masked and blended leaves and three colored panes that must be sorted.", alpha_scene},
+    {"builtin:materials", "Balls of layered materials: silks, jade and gold, skin, carbon, dusty paint, cloth.", materials_scene},
     {"builtin:lights", "A directional, a point and a spot light, each with its own shadows.", lights_scene},
 };
 

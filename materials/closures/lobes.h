@@ -42,6 +42,7 @@ struct Lobes {
 #include "materials/closures/glints.glsl"
 #include "materials/closures/haze.glsl"
 #include "materials/closures/math.glsl"
+#include "materials/closures/stored_fields.glsl"
 #include "materials/closures/thin_film.glsl"
 #undef const
 #undef float

@@ -4,10 +4,15 @@
 // The tables that the closures ask for, out of buffers that hold their words as they are, two in each uint. Who
 // includes this has declared uint interface_words[] and, where slabs have the features, anisotropy_words[] and
 // medium_words[]. Reading them interpolated is the same on every device, which a texture's filter is not.
+#ifndef interface_word
+#define interface_word(at) interface_words[at]
+#define anisotropy_word(at) anisotropy_words[at]
+#define medium_word(at) medium_words[at]
+#endif
 
 vec4 interface_entry(int column, int row) {
     int at = 2 * (row * 64 + column);
-    return vec4(unpackUnorm2x16(interface_words[at]), unpackUnorm2x16(interface_words[at + 1]));
+    return vec4(unpackUnorm2x16(interface_word(at)), unpackUnorm2x16(interface_word(at + 1)));
 }
 
 vec4 interface_table(vec2 at) {
@@ -21,7 +26,7 @@ vec4 interface_table(vec2 at) {
 #ifdef NACRE_SLAB_MEDIUM
 vec2 medium_row(ivec3 at, vec3 part) {
     int word = (at.z * 41 + at.y) * 16 + at.x;
-    return mix(unpackUnorm2x16(medium_words[word]), unpackUnorm2x16(medium_words[word + 1]), part.x);
+    return mix(unpackUnorm2x16(medium_word(word)), unpackUnorm2x16(medium_word(word + 1)), part.x);
 }
 
 vec2 medium_slice(ivec3 at, vec3 part) {
@@ -47,7 +52,7 @@ vec2 anisotropy_table(vec4 at) {
         vec4 weight = mix(vec4(1.0) - part, part, vec4(offset));
         ivec4 index = entry + offset;
         int word = ((index.w * 12 + index.z) * 10 + index.y) * 12 + index.x;
-        sum += weight.x * weight.y * weight.z * weight.w * unpackUnorm2x16(anisotropy_words[word]);
+        sum += weight.x * weight.y * weight.z * weight.w * unpackUnorm2x16(anisotropy_word(word));
     }
     return sum;
 }

@@ -3,7 +3,8 @@
 
 /// @file
 /// Base pass: evaluates the materials of what is seen and packs them into the three words of the G-buffer
-/// (passes/gbuffer_layout.h). It writes color targets only, no storage, and tests for the depth of the prepasses.
+/// (passes/gbuffer_layout.h). Materials of several lobes may need more words, which go to slices of a storage image; all
+/// else is color targets. Tests for the depth of the prepasses.
 
 namespace nacre::passes {
 
@@ -13,7 +14,8 @@ namespace {
 
 class BasePass final : public RenderPass {
   public:
-    explicit BasePass(RenderContext& context) : resources_(context.resources), visible_(context.visible) {
+    explicit BasePass(RenderContext& context)
+        : resources_(context.resources), device_(context.device), visible_(context.visible) {
         name = "base pass";
         desc_ = {.name = name,
                  .vertex_shader = "passes/base_pass/base_pass.vert",
@@ -28,7 +30,13 @@ class BasePass final : public RenderPass {
                  .color_targets = {{.format = rhi::Format::r32_uint},
                                    {.format = rhi::Format::r32_uint},
                                    {.format = rhi::Format::r32_uint}},
-                 .frame_layout = context.camera_layout};
+                 .frame_layout = context.camera_layout,
+                 .closure_shader = "passes/closures/base_pass_"};
+        const std::uint32_t slices = context.closures.lighting().slices;
+        if (slices > 0) desc_.defines.push_back({"MATERIAL_SLICES", std::to_string(slices)});
+        if (context.closures.lighting().has_subsurface) {
+            desc_.defines.push_back({"SUBSURFACE_SLICE", std::to_string(slices - 1)});
+        }
         selected_ = select_draws(context.geometry, [](const Draw& draw) {
             return draw.alpha_mode != materials::AlphaMode::blend;
         });
@@ -37,6 +45,7 @@ class BasePass final : public RenderPass {
         pass.uses(resources_.material_0, ResourceUse::color_target)
             .uses(resources_.material_1, ResourceUse::color_target)
             .uses(resources_.top_layer, ResourceUse::color_target)
+            .uses(resources_.material_slices, ResourceUse::storage_write)
             .uses(resources_.depth, ResourceUse::depth_stencil_read);
         const FrameUse camera[] = {{.buffer = context.resources.camera, .use = ResourceUse::uniform_buffer}};
         uses_geometry(pass, context, desc_, selected_, camera);
@@ -49,16 +58,36 @@ class BasePass final : public RenderPass {
                 target.color.push_back(attachment);
             }
             frame.list.begin_render_pass(target);
-            draws_.record(frame.list, group_, visible_);
+            draws_.record(frame.list, group_, visible_, slices_group_);
             frame.list.end_render_pass();
         });
     }
 
-    Expected<void> prepare(RenderContext& context) override { return draws_.prepare(context, desc_, selected_); }
+    ~BasePass() override {
+        if (slices_group_) device_.destroy(slices_group_);
+    }
+
+    Expected<void> prepare(RenderContext& context) override {
+        if (resources_.material_slices) {
+            NACRE_TRY(desc_.closure_layout, device_.create_bind_group_layout(
+                                                {.bindings = {{.binding = 0,
+                                                               .type = rhi::BindingType::writeonly_storage_image,
+                                                               .stages = rhi::ShaderStage::fragment}},
+                                                 .name = "material slices"}));
+            NACRE_TRY(slices_group_, device_.create_bind_group(
+                                         {.layout = desc_.closure_layout,
+                                          .entries = {{.binding = 0,
+                                                       .texture = context.graph.texture(resources_.material_slices)}},
+                                          .name = "material slices"}));
+        }
+        return draws_.prepare(context, desc_, selected_);
+    }
     [[nodiscard]] std::uint64_t draw_count() const override { return draws_.size(); }
 
   private:
     const FrameResources resources_;  // a copy: later passes change roles
+    rhi::Device& device_;
+    rhi::BindGroup slices_group_{};
     GeometryPassDesc desc_;
     std::vector<std::uint32_t> selected_;
     rhi::BindGroup group_;

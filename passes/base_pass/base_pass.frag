@@ -17,7 +17,7 @@ void main() {
     material_1 = 0u;
     top_layer = pack_normal(vec3(0.0, 0.0, 1.0)) | pack_roughness(1.0);
 #else
-    Slab slab = evaluate_slab(color);
+    SingleSlab slab = evaluate_slab(color);
     material_0 = pack_pixel_class(1u) | pack_occlusion(slab.occlusion) | pack_diffuse_r(slab.diffuse.r) |
                  pack_diffuse_g(slab.diffuse.g) | pack_diffuse_b(slab.diffuse.b);
     material_1 = pack_f0_r(slab.f0.r) | pack_f0_g(slab.f0.g) | pack_f0_b(slab.f0.b) | pack_f90(slab.f90);

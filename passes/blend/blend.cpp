@@ -37,7 +37,8 @@ class Blend final : public RenderPass {
                                    .depth_test = true,
                                    .depth_write = packed_,
                                    .depth_compare = rhi::CompareOperation::greater_or_equal},
-                 .frame_layout = context.lighting_layout};
+                 .frame_layout = context.lighting_layout,
+                 .closure_shader = "passes/closures/blend_"};
         desc_.defines.push_back({"HAS_POSITIONS"});
         FrameResources& resources = context.resources;
         camera_ = resources.camera;
@@ -52,6 +53,12 @@ class Blend final : public RenderPass {
                                               .destination_color = rhi::BlendFactor::one_minus_source_alpha,
                                               .source_alpha = rhi::BlendFactor::zero,
                                               .destination_alpha = rhi::BlendFactor::one}}};
+            if (context.device.capabilities().dual_source_blending) {
+                // What passes through a medium is colored.
+                desc_.closure_color_targets = desc_.color_targets;
+                desc_.closure_color_targets[0].blend.destination_color = rhi::BlendFactor::source1_color;
+                desc_.closure_defines.push_back({"DUAL_SOURCE"});
+            }
             PassDeclaration pass = context.graph.add_pass(name);
             pass.uses(resources.lit, ResourceUse::color_target).uses(resources.depth, ResourceUse::depth_stencil_read);
             uses_geometry(pass, context, desc_, sorted_, lighting_uses(resources));

@@ -18,8 +18,9 @@ constexpr std::uint64_t tile_list_bytes = 16;
 struct TileList {
     std::uint32_t index;
     bool slab, unlit;
+    bool closures = false;
 };
-constexpr std::array<TileList, 3> lists = {{{0, true, false}, {1, false, true}, {2, true, true}}};
+constexpr std::array<TileList, 4> lists = {{{0, true, false}, {1, false, true}, {2, true, true}, {4, true, true, true}}};
 
 class Lighting final : public RenderPass {
   public:
@@ -28,7 +29,10 @@ class Lighting final : public RenderPass {
         name = "lighting";
         const Decisions& decisions = context.decisions;
         for (const TileList& list : lists) {
-            if ((list.slab && !decisions.slab) || (list.unlit && !decisions.unlit)) continue;
+            // Tiles with closures may hold anything else too.
+            const bool is_possible = list.closures ? decisions.closures
+                                                   : (!list.slab || decisions.slab) && (!list.unlit || decisions.unlit);
+            if (!is_possible) continue;
             steps_.push_back({list, {}});
         }
         PassDeclaration pass = context.graph.add_pass(name);
@@ -42,6 +46,14 @@ class Lighting final : public RenderPass {
                 .uses(resources_.top_layer, ResourceUse::sampled)
                 .uses(resources_.depth, ResourceUse::sampled);
             uses_lighting(pass, resources_);
+        }
+        if (decisions.closures) {
+            pass.uses(resources_.material_slices, ResourceUse::sampled);
+            for (std::uint32_t table = 0; table < closure_table_count; ++table) {
+                if (context.materials.table(table)) {
+                    pass.uses(resources_.material_textures[context.materials.table_place(table)], ResourceUse::sampled);
+                }
+            }
         }
         pass.records([this](PassContext& frame) {
             for (const Step& step : steps_) {
@@ -75,6 +87,18 @@ class Lighting final : public RenderPass {
                 }
             }
             if (step.list.unlit) source.defines.push_back({"UNLIT"});
+            if (step.list.closures) {
+                for (const rhi::ShaderDefine& define : context.closures.lighting_defines()) source.defines.push_back(define);
+                const auto add = [&](std::uint32_t binding, rhi::Texture texture) {
+                    entries.push_back({.binding = binding, .texture = texture, .sampler = context.nearest});
+                    bindings.push_back({.binding = binding, .type = rhi::BindingType::combined_texture_sampler});
+                };
+                const std::uint32_t features = context.closures.lighting().features;
+                add(8, context.materials.table(0));
+                if ((features & materials::slab_medium) != 0) add(9, context.materials.table(1));
+                if ((features & materials::slab_anisotropy) != 0) add(10, context.materials.table(2));
+                if (resources_.material_slices) add(11, graph.texture(resources_.material_slices));
+            }
             entries.push_back({.binding = 4, .buffer = graph.buffer(resources_.tile_lists)});
             bindings.push_back({.binding = 4, .type = rhi::BindingType::readonly_storage_buffer});
             entries.push_back({.binding = 5, .buffer = graph.buffer(resources_.tiles)});

@@ -41,6 +41,12 @@ vec3 direction_to_viewer(vec3 position) {
     return to_viewer * inversesqrt(max(dot(to_viewer, to_viewer), 1e-20));
 }
 
+// Meters that a pixel covers at a distance, on a surface that faces the viewer.
+float pixel_footprint(vec3 position) {
+    float distance_to_viewer = camera_is_orthographic() ? 1.0 : length(camera.position.xyz - position);
+    return 2.0 * camera.projection.y * camera.size.w * distance_to_viewer;
+}
+
 // Unit direction in which a pixel looks.
 vec3 view_ray(ivec2 pixel) {
     if (camera_is_orthographic()) return -camera.world[2].xyz;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef NACRE_GGX
 #define NACRE_GGX
-
-const float pi = 3.14159265358979;
+#include "materials/closures/math.glsl"
 
 // GGX distribution of microfacet normals around n. sin^2 comes from the cross product (Lagrange's identity): 1 - cos^2
 // loses all digits for smooth surfaces in 32 bits.

@@ -8,7 +8,7 @@
 // shadows. SHADOW_LAYERS: there are several, and the map has layers. SHADOW_FILTER_WIDTH: 1, 3 or 5.
 #include "passes/shared/camera.glsl"
 #include "passes/shared/ggx.glsl"
-#include "passes/shared/slab.glsl"
+#include "passes/shared/single_slab.glsl"
 #include "passes/shared/spherical_harmonics.glsl"
 
 #ifdef LIGHTS
@@ -83,7 +83,30 @@ float shadow(Light light, vec3 position, vec3 normal, vec3 to_light, float dista
 // Punctual lights are infinitely small: below this roughness their highlights are smaller than a pixel.
 const float smallest_roughness_for_lights = 0.045;
 
-vec3 shade_slab(Slab slab, vec3 position, vec3 to_viewer) {
+#ifdef LIGHTS
+// Illuminance on a surface that faces the light, without shadows.
+vec3 incident_light(Light light, vec3 position, out vec3 to_light, out float distance_to_light) {
+    to_light = -light.direction.xyz;
+    vec3 incident = light.color.rgb;
+    distance_to_light = 0.0;
+    if (light.color.w != 0.0) {
+        vec3 offset = light.position.xyz - position;
+        float distance_squared = max(dot(offset, offset), 1e-8);
+        distance_to_light = sqrt(distance_squared);
+        to_light = offset / distance_to_light;
+        // Window of KHR_lights_punctual.
+        float in_range = distance_squared * light.position.w;
+        incident *= clamp(1.0 - in_range * in_range, 0.0, 1.0) / distance_squared;
+        if (light.color.w == 2.0) {
+            float cone = clamp(dot(light.direction.xyz, -to_light) * light.cone.x + light.cone.y, 0.0, 1.0);
+            incident *= cone * cone;
+        }
+    }
+    return incident;
+}
+#endif
+
+vec3 shade_slab(SingleSlab slab, vec3 position, vec3 to_viewer) {
     // Shading normals may point away from the viewer; the cosine is kept off 0 so that nothing divides by it.
     float cos_o = max(dot(slab.normal, to_viewer), 1e-4);
     vec2 table_size = vec2(textureSize(albedo_table, 0));
@@ -105,22 +128,9 @@ vec3 shade_slab(Slab slab, vec3 position, vec3 to_viewer) {
     float alpha = lights_roughness * lights_roughness;
     for (uint i = 0u; i < light_count.x; ++i) {
         Light light = lights[i];
-        vec3 to_light = -light.direction.xyz;
-        vec3 incident = light.color.rgb;
-        float distance_to_light = 0.0;
-        if (light.color.w != 0.0) {
-            vec3 offset = light.position.xyz - position;
-            float distance_squared = max(dot(offset, offset), 1e-8);
-            distance_to_light = sqrt(distance_squared);
-            to_light = offset / distance_to_light;
-            // Window of KHR_lights_punctual.
-            float in_range = distance_squared * light.position.w;
-            incident *= clamp(1.0 - in_range * in_range, 0.0, 1.0) / distance_squared;
-            if (light.color.w == 2.0) {
-                float cone = clamp(dot(light.direction.xyz, -to_light) * light.cone.x + light.cone.y, 0.0, 1.0);
-                incident *= cone * cone;
-            }
-        }
+        vec3 to_light;
+        float distance_to_light;
+        vec3 incident = incident_light(light, position, to_light, distance_to_light);
         float cos_i = dot(slab.normal, to_light);
         if (cos_i <= 0.0 || max(incident.r, max(incident.g, incident.b)) <= 0.0) continue;
 #ifdef SHADOW_VIEWS

@@ -3,7 +3,8 @@
 // (BASE_COLOR_TEXTURE, ...); its value is the number of its texture coordinates, 0 or 1.
 #ifndef NACRE_MATERIAL
 #define NACRE_MATERIAL
-#include "passes/shared/slab.glsl"
+#include "passes/shared/fragment_inputs.glsl"
+#include "passes/shared/single_slab.glsl"
 
 layout(set = 1, binding = 0, std140) uniform MaterialBlock {
     vec4 base_color;    // rgb, alpha
@@ -14,30 +15,6 @@ layout(set = 1, binding = 0, std140) uniform MaterialBlock {
     vec4 uv_rows[14];   // two rows for each texture, in the order of the bindings
 #endif
 } material;
-
-#ifdef HAS_NORMALS
-layout(location = 0) in vec3 in_normal;
-#endif
-#ifdef HAS_TANGENTS
-layout(location = 1) in vec4 in_tangent;
-#endif
-#ifdef HAS_UV0
-layout(location = 2) in vec2 in_uv0;
-#endif
-#ifdef HAS_UV1
-layout(location = 3) in vec2 in_uv1;
-#endif
-#ifdef HAS_COLORS
-layout(location = 4) in vec4 in_color;
-#endif
-
-#if defined(HAS_UV0) && defined(HAS_UV1)
-vec2 uv_of(int set) { return set == 0 ? in_uv0 : in_uv1; }
-#elif defined(HAS_UV0)
-vec2 uv_of(int set) { return in_uv0; }
-#elif defined(HAS_UV1)
-vec2 uv_of(int set) { return in_uv1; }
-#endif
 
 #ifdef TEXTURE_TRANSFORMS
 vec2 moved_uv(int set, int slot) {
@@ -90,12 +67,6 @@ vec3 emission() {
     return min(color, vec3(65504.0));
 }
 
-// v scaled to length 1, or the fallback where it is too short to have a direction.
-vec3 unit_or(vec3 v, vec3 fallback) {
-    float length_squared = dot(v, v);
-    return length_squared > 1e-12 ? v * inversesqrt(length_squared) : fallback;
-}
-
 #ifdef HAS_NORMALS
 vec3 shading_normal() {
     vec3 normal = unit_or(in_normal, vec3(0.0, 1.0, 0.0));
@@ -112,8 +83,8 @@ vec3 shading_normal() {
     return normal;
 }
 
-Slab evaluate_slab(vec3 color) {
-    Slab slab;
+SingleSlab evaluate_slab(vec3 color) {
+    SingleSlab slab;
     float metallic = material.emission.w;
     slab.roughness = material.scales.x;
 #ifdef METALLIC_ROUGHNESS_TEXTURE

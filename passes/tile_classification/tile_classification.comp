@@ -6,7 +6,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0) uniform usampler2D material_0;
-layout(set = 0, binding = 1, std430) buffer TileLists { TileList lists[4]; };
+layout(set = 0, binding = 1, std430) buffer TileLists { TileList lists[TILE_LISTS]; };
 layout(set = 0, binding = 2, std430) writeonly buffer Tiles { uint tiles[]; };
 #ifdef WRITE_CLASSES
 layout(set = 0, binding = 3, r32ui) uniform writeonly uimage2D tile_classes;
@@ -34,6 +34,10 @@ void main() {
         uint tile = gl_WorkGroupID.x | (gl_WorkGroupID.y << 16);
         uint tile_count = gl_NumWorkGroups.x * gl_NumWorkGroups.y;
         bool has_slab = (classes & 2u) != 0u, has_unlit = (classes & 4u) != 0u;
+#ifdef CLOSURES
+        if ((classes & 8u) != 0u) append(list_closures, tile, tile_count);
+        else
+#endif
         if (has_slab && has_unlit) append(list_mixed, tile, tile_count);
         else if (has_slab) append(list_slab, tile, tile_count);
         else if (has_unlit) append(list_unlit, tile, tile_count);

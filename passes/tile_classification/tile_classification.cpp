@@ -15,7 +15,8 @@ namespace {
 class TileClassification final : public RenderPass {
   public:
     explicit TileClassification(RenderContext& context)
-        : resources_(context.resources), device_(context.device), write_classes_(context.write_tile_classes) {
+        : resources_(context.resources), device_(context.device), write_classes_(context.write_tile_classes),
+          closures_(context.decisions.closures) {
         name = "tile classification";
         groups_ = {(context.width + 7) / 8, (context.height + 7) / 8, 1};
         PassDeclaration pass = context.graph.add_pass(name);
@@ -25,7 +26,8 @@ class TileClassification final : public RenderPass {
             .uses(resources_.tiles, ResourceUse::storage_read | ResourceUse::storage_write);
         if (write_classes_) pass.uses(resources_.tile_classes, ResourceUse::storage_write);
         pass.records([this](PassContext& frame) {
-            frame.list.copy_buffer(frame.buffer(resources_.tile_lists_start), 0, frame.buffer(resources_.tile_lists), 0, 64);
+            frame.list.copy_buffer(frame.buffer(resources_.tile_lists_start), 0, frame.buffer(resources_.tile_lists), 0,
+                                   16 * tile_list_count(closures_));
             step_.bind(frame.list);
             frame.list.dispatch(groups_);
         });
@@ -39,6 +41,7 @@ class TileClassification final : public RenderPass {
             {.binding = 0, .texture = graph.texture(resources_.material_0), .sampler = context.nearest},
             {.binding = 1, .buffer = graph.buffer(resources_.tile_lists)},
             {.binding = 2, .buffer = graph.buffer(resources_.tiles)}};
+        if (closures_) source.defines.push_back({"CLOSURES"});
         if (write_classes_) {
             source.defines.push_back({"WRITE_CLASSES"});
             entries.push_back({.binding = 3, .texture = graph.texture(resources_.tile_classes)});
@@ -49,7 +52,7 @@ class TileClassification final : public RenderPass {
   private:
     const FrameResources resources_;  // a copy: later passes change roles
     rhi::Device& device_;
-    bool write_classes_;
+    bool write_classes_, closures_;
     rhi::DispatchArguments groups_;
     ComputeStep step_;
 };

@@ -15,53 +15,6 @@
 namespace nacre::materials {
 namespace {
 
-std::uint32_t bytes_of(std::string_view name) {
-    const auto tree = make_builtin_material(name);
-    EXPECT_TRUE(tree);
-    const auto flat = flatten(*tree);
-    EXPECT_TRUE(flat) << flat.error().message();
-    return storage_layout(*flat).total_bytes();
-}
-
-// The rows of storage of the Substrate talk; each holds all that those before it hold.
-TEST(Storage, RowsTakeAtMostWhatTheTalkStates) {
-    const std::pair<const char*, std::uint32_t> rows[] = {
-        {"simple", 12},         {"single", 16},        {"single-haze-f90", 20}, {"single-fuzz", 24},
-        {"single-sss", 28},     {"complex-aniso", 28}, {"complex-coat", 40},    {"special-speclut", 44},
-        {"special-glints", 60}, {"complex-opal", 76}};
-    std::uint32_t features = 0, closures = 0;
-    for (const auto& [name, bytes] : rows) {
-        EXPECT_LE(bytes_of(name), bytes) << name;
-        const auto flat = flatten(*make_builtin_material(name));
-        EXPECT_EQ(features & ~flat->topology.features, 0u) << name << " lacks a feature of the row before";
-        EXPECT_GE(flat->topology.closures.size(), closures) << name;
-        features = flat->topology.features;
-        closures = static_cast<std::uint32_t>(flat->topology.closures.size());
-    }
-    EXPECT_EQ(bytes_of("simple"), 12u);
-}
-
-TEST(Storage, LayoutHasNoFieldTwiceAndCountsItsBits) {
-    std::mt19937 random(2);
-    std::uint32_t all = 0;
-    for (const SlabFeature& feature : slab_features()) all |= feature.bit;
-    for (std::uint32_t i = 0; i < 100; ++i) {
-        const auto flat = flatten(random_tree(random, {.slabs = 1 + i % 5, .features = all}));
-        ASSERT_TRUE(flat) << flat.error().message();
-        const StorageLayout layout = storage_layout(*flat);
-        std::map<std::pair<std::uint32_t, std::string>, int> seen;
-        std::uint32_t bits = 0;
-        for (const StorageField& field : layout.fields) {
-            bits += field.bits;
-            EXPECT_TRUE(field.closure == StorageLayout::no_closure || field.closure < flat->topology.closures.size());
-            if (field.closure != StorageLayout::no_closure)
-                EXPECT_EQ(++seen[std::pair(field.closure, field.name)], 1) << field.name;
-        }
-        EXPECT_LE(bits, 32 * layout.material_words());
-        EXPECT_TRUE(layout.material_words() == 2 || bits > 32 * (layout.material_words() - 1));
-    }
-}
-
 // The talk's example: 3 closures in 72 bytes, 2 in 48, 1 in 12.
 TEST(Simplification, TheTalksExample) {
     const auto tree = make_builtin_material("coated-carbon");

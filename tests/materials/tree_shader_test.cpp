@@ -10,46 +10,16 @@
 #include <random>
 
 #include "materials/evaluation.h"
-#include "materials/tables/anisotropy_table.h"
-#include "materials/tables/interface_table.h"
-#include "materials/tables/medium_table.h"
 #include "rhi/device.h"
-#include "rhi/shader_compiler.h"
 #include "samples/backends.h"
 #include "tests/materials/random_tree.h"
+#include "tests/materials/tree_run.h"
 
 namespace nacre::materials {
 namespace {
 
-constexpr std::uint32_t pairs = 256;
-
-// Views and lights at all angles; some of them grazing.
-std::vector<glm::vec4> directions(std::mt19937& random) {
-    std::vector<glm::vec4> result;
-    const auto uniform = [&] { return static_cast<float>(random() >> 8) * 0x1p-24f; };
-    for (std::uint32_t i = 0; i < 2 * pairs; ++i) {
-        const float z = i % 8 == 0 ? 0.001f + 0.01f * uniform() : 0.02f + 0.98f * uniform();
-        const float phi = 6.2831853f * uniform(), radius = std::sqrt(1.0f - z * z);
-        result.emplace_back(radius * std::cos(phi), radius * std::sin(phi), z, 0.0f);
-    }
-    return result;
-}
-
-constexpr const char* shader_text = R"(
-layout(local_size_x = 64) in;
-layout(set = 0, binding = 0, std430) readonly buffer Directions { vec4 directions[]; };
-layout(set = 0, binding = 1, std430) readonly buffer Parameters { float parameters[]; };
-layout(set = 0, binding = 2, std430) writeonly buffer Results { vec4 results[]; };
-layout(set = 0, binding = 3, std430) readonly buffer InterfaceTable { uint interface_words[]; };
-layout(set = 0, binding = 4, std430) readonly buffer MediumTable { uint medium_words[]; };
-layout(set = 0, binding = 5, std430) readonly buffer AnisotropyTable { uint anisotropy_words[]; };
-#include "materials/closures/table_buffers.glsl"
-float tree_parameter(uint index) { return parameters[index]; }
-// Textures of the test: four different values.
-vec4 tree_texture(uint index) { return vec4(0.25, 0.5, 0.75, 1.0); }
-)";
-
 constexpr const char* main_text = R"(
+layout(set = 0, binding = 2, std430) writeonly buffer Results { vec4 results[]; };
 void main() {
     uint i = gl_GlobalInvocationID.x;
     vec3 views[tree_frame_count];
@@ -74,43 +44,8 @@ class TreeShaderTest : public testing::TestWithParam<const char*> {
     }
 
     Expected<std::vector<glm::vec4>> run(const TreeShader& tree, const std::vector<glm::vec4>& inputs) {
-        rhi::ShaderCompiler compiler({.embedded = {embedded_files()}});
-        NACRE_TRY(const rhi::ShaderDesc text,
-                  compiler.compile({.path = "tree.comp", .text = tree.defines + shader_text + tree.glsl + main_text}));
-        NACRE_TRY(const rhi::Shader shader, device_->create_shader(text));
-        NACRE_TRY(const rhi::ComputePipeline pipeline,
-                  device_->create_compute_pipeline({.shader = shader, .name = "tree"}));
-        const auto make = [&](std::size_t size, const void* data, const char* name) -> Expected<rhi::Buffer> {
-            NACRE_TRY(rhi::Buffer buffer,
-                      device_->create_buffer({.size = size, .usage = rhi::BufferUsage::storage, .name = name}));
-            if (data != nullptr)
-                NACRE_CHECK(device_->write_buffer(buffer, std::span(static_cast<const std::byte*>(data), size)));
-            return buffer;
-        };
-        NACRE_TRY(const rhi::Buffer directions, make(inputs.size() * sizeof(glm::vec4), inputs.data(), "directions"));
-        NACRE_TRY(const rhi::Buffer parameters, make(tree.parameters.size() * 4, tree.parameters.data(), "parameters"));
-        NACRE_TRY(const rhi::Buffer table_0,
-                  make(interface_table().size_bytes(), interface_table().data(), "interface"));
-        NACRE_TRY(const rhi::Buffer table_1, make(medium_table().size_bytes(), medium_table().data(), "medium"));
-        NACRE_TRY(const rhi::Buffer table_2,
-                  make(anisotropy_table().size_bytes(), anisotropy_table().data(), "anisotropy"));
-        NACRE_TRY(const rhi::Buffer results, make(inputs.size() * sizeof(glm::vec4), nullptr, "results"));
-        NACRE_TRY(const rhi::BindGroupLayout layout, device_->bind_group_layout(pipeline, 0));
-        NACRE_TRY(const rhi::BindGroup group,
-                  device_->create_bind_group({.layout = layout,
-                                              .entries = {{.binding = 0, .buffer = directions},
-                                                          {.binding = 1, .buffer = parameters},
-                                                          {.binding = 2, .buffer = results},
-                                                          {.binding = 3, .buffer = table_0},
-                                                          {.binding = 4, .buffer = table_1},
-                                                          {.binding = 5, .buffer = table_2}},
-                                              .name = "tree"}));
-        rhi::CommandList list = device_->create_command_list("tree");
-        list.set_pipeline(pipeline);
-        list.set_bind_group(0, group);
-        list.dispatch({.x = pairs / 64});
-        NACRE_CHECK(device_->submit(std::move(list)));
-        NACRE_TRY(const std::vector<std::byte> bytes, device_->read_buffer(results));
+        NACRE_TRY(const std::vector<std::byte> bytes,
+                  run_tree(*device_, tree, tree.glsl + main_text, inputs, inputs.size() * sizeof(glm::vec4)));
         std::vector<glm::vec4> values(inputs.size());
         std::memcpy(values.data(), bytes.data(), bytes.size());
         return values;
@@ -118,12 +53,12 @@ class TreeShaderTest : public testing::TestWithParam<const char*> {
 
     // Compares what the device makes of a tree with the host, which counts in doubles.
     void compare(const FlattenedTree& flat, const FlattenedTree& host_tree, std::mt19937& random) {
-        const std::vector<glm::vec4> inputs = directions(random);
+        const std::vector<glm::vec4> inputs = random_directions(random);
         const auto results = run(tree_shader(flat), inputs);
         ASSERT_TRUE(results) << results.error().message();
         double worst = 0.0;
         std::uint32_t worst_at = 0;
-        for (std::uint32_t i = 0; i < pairs; ++i) {
+        for (std::uint32_t i = 0; i < direction_pairs; ++i) {
             const glm::dvec3 view = glm::normalize(glm::dvec3(inputs[2 * i])),
                              light = glm::normalize(glm::dvec3(inputs[2 * i + 1]));
             const ShadedTree shaded = shade(host_tree, view);
@@ -188,8 +123,8 @@ TEST_P(TreeShaderTest, TexturesMultiplyTheirInputs) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, TreeShaderTest, testing::Values("cpu:consistent", "vulkan", "gl"),
-                         [](const auto& info) {
-                             return std::string(info.param).substr(0, std::string(info.param).find(':'));
+                         [](const auto& backend) {
+                             return std::string(backend.param).substr(0, std::string(backend.param).find(':'));
                          });
 
 // Materials of one topology share a shader, whatever their numbers are.

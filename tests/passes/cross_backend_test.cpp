@@ -29,6 +29,8 @@ Reference take(const Shot& shot) {
 TEST_P(CrossBackend, BuiltinScenesAgree) {
     static std::map<std::string, Reference> references;
     for (const std::string_view name : scene::builtin_scene_names()) {
+        // Its words are streams of fields, which measure/closure_comparison.h compares.
+        if (name == "builtin:materials") continue;
         auto scene = scene::make_builtin_scene(name);
         ASSERT_TRUE(scene);
         const std::string profile = GetParam().profile;

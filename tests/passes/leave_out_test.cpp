@@ -59,6 +59,8 @@ const OptionalFeature optional_features[] = {
      }},
     {"texture transforms", Feature::texture_transforms,
      [](scene::Scene& s) { s.materials[1].base_color_texture.transform.offset.x = 0.5f; }},
+    {"closures", Feature::closures,
+     [](scene::Scene& s) { s.materials[0].clearcoat = materials::Clearcoat{.factor = 1.0f}; }},
     {"specular textures", Feature::specular_textures,
      [](scene::Scene& s) {
          s.materials[0].specular = materials::Specular{};

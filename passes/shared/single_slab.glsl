@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#ifndef NACRE_SLAB
-#define NACRE_SLAB
+#ifndef NACRE_SINGLE_SLAB
+#define NACRE_SINGLE_SLAB
 
 // What is shaded: a base of diffuse or metal under one GGX interface.
-struct Slab {
+struct SingleSlab {
     vec3 diffuse;     // albedo of the base, [0, 1]
     vec3 f0;          // reflectance of the interface at normal incidence, [0, 1]
     float f90;        // at grazing incidence

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <glm/vec4.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/embedded_file.h"
+#include "core/error.h"
+#include "materials/storage_shader.h"
+#include "materials/tree_shader.h"
+#include "passes/profiles.h"
+#include "passes/shading_features.h"
+#include "scene/scene.h"
+
+/// @file
+/// Which materials of a scene are more than one plain slab, simplified to what the profile allows, and the GLSL that
+/// writes and shades them: one text for each topology.
+///
+///     NACRE_TRY(const SceneClosures closures, SceneClosures::choose(scene, *profile, warnings));
+///     if (const ClosureMaterial* material = closures.find(draw.material)) ... material->topology ...
+
+namespace nacre::passes {
+
+/// A material that is shaded by closures.
+struct ClosureMaterial {
+    materials::FlattenedTree flat;
+    materials::StorageLayout layout;
+    std::uint32_t topology = 0;             ///< Number of its text; materials of one topology share shaders.
+    std::vector<glm::vec4> numbers;         ///< Content of ClosureBlock.
+    std::vector<materials::TextureReference> textures;  ///< Binding first_closure_texture and on of set 1.
+    std::uint32_t features = 0;             ///< Of all slabs that the base pass evaluates.
+    bool is_translucent = false;            ///< What lies behind shows through.
+    bool needs_tangents = false;
+
+    /// Material words beyond the color targets.
+    [[nodiscard]] bool writes_slices() const { return layout.material_words() > 2 || layout.has_subsurface; }
+};
+
+/// Bindings of set 1 of these materials: the block, three tables, then textures.
+inline constexpr std::uint32_t closure_table_count = 3;  ///< Interface, medium, anisotropy.
+inline constexpr std::uint32_t first_closure_texture = 1 + closure_table_count;
+
+class SceneClosures {
+  public:
+    /// Looks at the materials that the scene's meshes use. What a profile or the device cannot hold is simplified;
+    /// `warnings` tells of materials that lose something that is not the profile's choice.
+    static Expected<SceneClosures> choose(const scene::Scene& scene, const Profile& profile, bool storage_in_fragment,
+                                          std::vector<std::string>& warnings);
+    /// None.
+    SceneClosures() = default;
+
+    [[nodiscard]] const ClosureMaterial* find(std::uint32_t material) const {
+        return material < materials_.size() && materials_[material] ? &*materials_[material] : nullptr;
+    }
+    [[nodiscard]] bool empty() const { return texts_.empty(); }
+
+    /// What the lighting of stored closures must know of all opaque ones.
+    struct Lighting {
+        bool any = false;                 ///< Some opaque material has a class above StorageClass::simple.
+        std::uint32_t features = 0;       ///< As stored.
+        std::uint32_t frames = 1;
+        bool has_layers = false;          ///< Closures lie below others.
+        bool has_subsurface = false;
+        std::uint32_t slices = 0;         ///< Of the storage image: words beyond the second; last, subsurface data.
+        std::uint32_t bytes = 12;         ///< Largest of a pixel.
+    };
+    [[nodiscard]] const Lighting& lighting() const { return lighting_; }
+    /// Which tables the materials' shaders read: bits 0 to 2 as closure_table_count tells.
+    [[nodiscard]] std::uint32_t tables() const { return tables_; }
+
+    /// What drawing a primitive with a material of this scene needs; `material` is one that find() knows.
+    [[nodiscard]] static ShadingFeatures features_of(const ClosureMaterial& material, const scene::Primitive& primitive,
+                                                     bool double_sided);
+
+    /// GLSL files of all topologies: "passes/closures/base_pass_N.frag" and "passes/closures/blend_N.frag". They live
+    /// as long as this object.
+    [[nodiscard]] std::vector<EmbeddedFile> files() const;
+    /// Defines for a shader that reads stored closures.
+    [[nodiscard]] std::vector<rhi::ShaderDefine> lighting_defines() const;
+
+  private:
+    struct Text {
+        std::string topology, topology_path;
+        std::string base_pass, base_pass_path;
+        std::string blend, blend_path;
+    };
+    std::vector<std::optional<ClosureMaterial>> materials_;
+    std::vector<std::unique_ptr<Text>> texts_;
+    Lighting lighting_;
+    std::uint32_t tables_ = 0;
+};
+
+}  // namespace nacre::passes
