@@ -73,7 +73,8 @@ struct SmallTriangles {
             low = maximum(first, ints(begin)), high = minimum(last, ints(~turned_last));
             // What lies behind the borders of the tile is in none of its blocks.
             const Lanes all = lanes_of(0xffff);
-            is_whole = (begin == 0 ? all : equal(first, low)) & (~turned_last == tile_size - 1 ? all : equal(last, high));
+            is_whole = (begin == 0 ? all : equal(first, low)) &
+                       (~turned_last == tile_size - 1 ? all : equal(last, high));
         };
         Ints low_x, high_x, low_y, high_y;
         Lanes small_x, small_y, whole_x, whole_y;
@@ -293,8 +294,8 @@ struct Coverage {
         run_blocks<3>(left, right, top, bottom);
     }
 
-    /// As run_simple_blocks, for one or two blocks across and down and with a depth test: without loops, and with hardly
-    /// a branch that the processor could guess wrong.
+    /// As run_simple_blocks, for one or two blocks across and down and with a depth test: without loops, and with
+    /// hardly a branch that the processor could guess wrong.
     template <int columns, int rows>
     [[gnu::always_inline]] void run_few_blocks(const SmallTriangles& from, std::uint32_t lane, std::int32_t first_x,
                                                std::int32_t first_y) {
@@ -364,7 +365,8 @@ struct Coverage {
         if (!draw.shades) return;
         std::uint32_t regions = 0;
         for (int i = 0; i < count; ++i)
-            regions |= 1u << ((first_y + row(i)) / region_blocks * regions_across + (first_x + column(i)) / region_blocks);
+            regions |= 1u << ((first_y + row(i)) / region_blocks * regions_across +
+                              (first_x + column(i)) / region_blocks);
         run.append_blocks<columns, rows>(place, masks, regions);
     }
 

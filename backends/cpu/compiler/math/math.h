@@ -26,8 +26,8 @@ struct MathOptions {
     /// The target converts between half and single precision by instructions (F16C, AVX-512, NEON). Results are the
     /// same bits.
     bool half_instructions = false;
-    /// The target takes numbers apart and scales them by powers of two by instructions (AVX-512 F and VL): less code for
-    /// exponentials and logarithms, within the same bounds of error.
+    /// The target takes numbers apart and scales them by powers of two by instructions (AVX-512 F and VL): less code
+    /// for exponentials and logarithms, within the same bounds of error.
     bool exponent_instructions = false;
 };
 

@@ -136,7 +136,8 @@ unsigned lanes_of(const Term& x) {
 
 /// A masked instruction of AVX-512 that does a thing to every lane. Scalars go through the first lane of a vector.
 /// @param intrinsics  for 4, 8 and 16 lanes
-Term for_all_lanes(const std::array<llvm::Intrinsic::ID, 3>& intrinsics, std::vector<llvm::Value*> operands, const Term& x) {
+Term for_all_lanes(const std::array<llvm::Intrinsic::ID, 3>& intrinsics, std::vector<llvm::Value*> operands,
+                   const Term& x) {
     llvm::IRBuilder<>& builder = x.builder();
     const unsigned lanes = std::max(lanes_of(x), 4u);
     auto* const vector = llvm::FixedVectorType::get(builder.getFloatTy(), lanes);
@@ -161,21 +162,21 @@ bool has_exponent_instructions(const Term& x) {
 }
 
 Term exponent_of(const Term& x) {
-    return for_all_lanes({llvm::Intrinsic::x86_avx512_mask_getexp_ps_128, llvm::Intrinsic::x86_avx512_mask_getexp_ps_256,
-                          llvm::Intrinsic::x86_avx512_mask_getexp_ps_512},
+    using namespace llvm::Intrinsic;
+    return for_all_lanes({x86_avx512_mask_getexp_ps_128, x86_avx512_mask_getexp_ps_256, x86_avx512_mask_getexp_ps_512},
                          {x.value()}, x);
 }
 
 Term significand_of(const Term& x) {
     constexpr std::uint32_t from_one_to_two = 0, negative_is_nan = 2 << 2;
-    return for_all_lanes({llvm::Intrinsic::x86_avx512_mask_getmant_ps_128, llvm::Intrinsic::x86_avx512_mask_getmant_ps_256,
-                          llvm::Intrinsic::x86_avx512_mask_getmant_ps_512},
+    using namespace llvm::Intrinsic;
+    return for_all_lanes({x86_avx512_mask_getmant_ps_128, x86_avx512_mask_getmant_ps_256, x86_avx512_mask_getmant_ps_512},
                          {x.value(), x.builder().getInt32(from_one_to_two | negative_is_nan)}, x);
 }
 
 Term times_power_of_two(const Term& x, const Term& exponent) {
-    return for_all_lanes({llvm::Intrinsic::x86_avx512_mask_scalef_ps_128, llvm::Intrinsic::x86_avx512_mask_scalef_ps_256,
-                          llvm::Intrinsic::x86_avx512_mask_scalef_ps_512},
+    using namespace llvm::Intrinsic;
+    return for_all_lanes({x86_avx512_mask_scalef_ps_128, x86_avx512_mask_scalef_ps_256, x86_avx512_mask_scalef_ps_512},
                          {x.value(), exponent.value()}, x);
 }
 

@@ -282,9 +282,9 @@ NACRE_INLINE void load_two_raw(const Source& source, const Place<W>& first, cons
 }
 
 #ifdef __AVX512F__
-/// The texels of footprints of two by two that begin at (x, y), where those of all lanes lie within four by three texels of
-/// one slice, as they do where an image is magnified: these are loaded and converted once, and lanes take theirs by
-/// permutations. False: they do not, and nothing was done. The footprints lie inside of the level.
+/// The texels of footprints of two by two that begin at (x, y), where those of all lanes lie within four by three
+/// texels of one slice, as they do where an image is magnified: these are loaded and converted once, and lanes take
+/// theirs by permutations. False: they do not, and nothing was done. The footprints lie inside of the level.
 /// @param texels  left and right of the upper row, then of the lower one
 NACRE_INLINE bool load_near_footprints(const Source& source, Ints<16> x, Ints<16> y, Ints<16> slice,
                                        Floats<16> (&texels)[4][4]) {

@@ -128,8 +128,8 @@ class Sampling : public testing::TestWithParam<Shape> {
     Random random{11};
 };
 
-// Patches of eight by two pixels, from far below a texel of the face apart to several of them: all lanes find their texels
-// in a few, or not.
+// Patches of eight by two pixels, from far below a texel of the face apart to several of them: all lanes find their
+// texels in a few, or not.
 TEST(MagnifiedCube, IsFilteredLaneByLane) {
     Random random{17};
     const SamplerState sampler{{.magnify = rhi::Filter::linear, .minify = rhi::Filter::linear}};
@@ -140,7 +140,8 @@ TEST(MagnifiedCube, IsFilteredLaneByLane) {
             const TestImage image({format, ViewDimension::cube, size, size, 1, 6}, random);
             std::vector<Point> points;
             for (int patch = 0; patch < 300; ++patch) {
-                const float texels = std::exp2(random_float(random, -6.0f, 1.0f)), step = texels * 2.0f / static_cast<float>(size);
+                const float texels = std::exp2(random_float(random, -6.0f, 1.0f));
+                const float step = texels * 2.0f / static_cast<float>(size);
                 const std::uint32_t axis = random_below(random, 3);
                 float base[3], dx[3], dy[3];
                 for (std::uint32_t i = 0; i < 3; ++i) {

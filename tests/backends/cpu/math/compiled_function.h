@@ -26,8 +26,8 @@ struct Variant {
     std::string name() const;
 };
 
-/// The variants whose accuracy is measured: with and without contraction, and with the instructions that the processor at
-/// hand has.
+/// The variants whose accuracy is measured: with and without contraction, and with the instructions that the processor
+/// at hand has.
 std::vector<Variant> measured_variants();
 
 /// The variants whose results have to agree in every bit: lane counts, targets, with and without optimization.
