@@ -13,7 +13,7 @@
 #include "materials/evaluation.h"
 #include "rhi/device.h"
 #include "samples/backends.h"
-#include "measure/random_tree.h"
+#include "tests/materials/random_tree.h"
 #include "tests/materials/tree_run.h"
 
 namespace nacre::materials {

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "materials/builtin_materials.h"
-#include "measure/random_tree.h"
+#include "tests/materials/random_tree.h"
 
 namespace nacre::materials {
 namespace {
