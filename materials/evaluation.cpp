@@ -38,7 +38,7 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
     std::vector<Library::Matter> matters(topology.matter_registers);
     std::vector<Library::Path> paths(topology.path_registers);
     std::vector<Library::Spread> spreads(topology.spread_registers);
-    std::vector<double> variances(topology.variance_registers, 0.0);
+    std::vector<Library::Widening> widenings(topology.widening_registers, library.no_widening());
     paths[0] = library.open_path();
     for (const Step& step : topology.steps) {
         double amount = step.amount == Step::none ? 0.0 : tree.visible_tree.nodes[topology.amounts[step.amount]].amount;
@@ -68,10 +68,10 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
             case StepKind::layer_spread:
                 spreads[step.result] = library.layer_spread(spreads[step.a], spreads[step.b]);
                 break;
-            case StepKind::variance_below:
-                variances[step.result] = library.variance_below(variances[step.a], spreads[step.b]);
+            case StepKind::widening_below:
+                widenings[step.result] = library.widening_below(widenings[step.a], spreads[step.b]);
                 break;
-            case StepKind::track_slab: slabs[step.result] = library.track_slab(slabs[step.a], variances[step.b]); break;
+            case StepKind::track_slab: slabs[step.result] = library.track_slab(slabs[step.a], widenings[step.b]); break;
             case StepKind::slab_matter:
                 matters[step.result] =
                     library.slab_matter(slabs[step.a], library.prepare_closure(slabs[step.a], view, footprint));
@@ -88,7 +88,7 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
                 paths[step.result] = library.path_through_mix(paths[step.a], amount);
                 break;
             case StepKind::path_through_layer:
-                paths[step.result] = library.path_through_layer(paths[step.a], matters[step.b], matters[step.c].albedo);
+                paths[step.result] = library.path_through_layer(paths[step.a], matters[step.b], matters[step.c]);
                 break;
         }
     }
@@ -99,7 +99,9 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
         result.rotation = tree.visible_tree.frames[closure.frame].rotation;
         result.frame_slot = static_cast<std::uint32_t>(std::ranges::find(topology.frames, closure.frame) -
                                                        topology.frames.begin());
-        result.closure = library.prepare_closure(result.slab, turned(view, result.rotation), footprint);
+        result.closure =
+            library.cover_closure(library.prepare_closure(result.slab, turned(view, result.rotation), footprint),
+                                  result.path.spread, result.path.under_interface);
         result.coverage = library.slab_coverage(result.slab, view.z);
         shaded.closures.push_back(result);
     }

@@ -16,9 +16,9 @@ namespace {
 
 using closures::Library;
 
-constexpr int strata = 6;      // squared: samples of each closure and pixel
 constexpr int box_strata = 5;  // squared: samples of the soft box
 constexpr double ball_diameter = 0.1;
+constexpr double ball_margin = 1.04;  // half the picture's side, by the ball's radius
 
 double smooth(double edge, double width, double x) {
     const double t = std::clamp((x - edge) / width + 0.5, 0.0, 1.0);
@@ -86,9 +86,10 @@ glm::dvec3 ambient_sky(const glm::dvec3& direction) {
 
 // What a closure sends to the view. The sky is sampled by the closure, the soft box by both, weighed by their densities
 // (Veach 1997, the balance heuristic).
-glm::dvec3 radiance_of(const ShadedClosure& c, const Frame& frame, std::uint32_t x, std::uint32_t y) {
+glm::dvec3 radiance_of(const ShadedClosure& c, const Frame& frame, std::uint32_t x, std::uint32_t y, int strata) {
     Library library;
-    constexpr double count = strata * strata, box_count = box_strata * box_strata;
+    const double count = strata * strata;
+    constexpr double box_count = box_strata * box_strata;
     glm::dvec3 sum(0.0);
     for (int i = 0; i < strata * strata; ++i) {
         const auto stratified = [&](double at, std::uint32_t dimension) {
@@ -118,50 +119,101 @@ glm::dvec3 radiance_of(const ShadedClosure& c, const Frame& frame, std::uint32_t
 }
 
 glm::dvec3 radiance(const FlattenedTree& tree, const glm::dvec3& normal, double footprint, std::uint32_t x,
-                    std::uint32_t y) {
+                    std::uint32_t y, int strata) {
     Library library;
     const Frame frame = frame_at(normal);
     const ShadedTree shaded = shade(tree, frame.to_local({0, 0, 1}), footprint);
     glm::dvec3 sum(0.0);
     for (const ShadedClosure& c : shaded.closures) {
-        glm::dvec3 sent = radiance_of(c, frame, x, y);
+        glm::dvec3 sent = radiance_of(c, frame, x, y, strata);
         if ((c.slab.features & slab_emission) != 0) sent += c.slab.emission;
         sum += c.path.weight * c.coverage * sent;
     }
     return sum + library.matter_throughput(shaded.whole) * preview_sky({0, 0, -1});
 }
 
+// Calls `work` with 0 to count - 1, on all threads.
+template <typename Work>
+void for_each_parallel(std::uint32_t count, const Work& work) {
+    std::atomic<std::uint32_t> next{0};
+    const auto run = [&] {
+        for (std::uint32_t i = next++; i < count; i = next++) work(i);
+    };
+    std::vector<std::jthread> threads;
+    for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) threads.emplace_back(run);
+    run();
+}
+
+// A picture of a ball whose points, by normal and place, have the radiance that `radiance` says.
+template <typename Radiance>
+Image ball_of(std::uint32_t size, const Radiance& radiance) {
+    Image image{.width = size, .height = size, .channels = 3};
+    image.pixels.resize(std::size_t{3} * size * size);
+    for_each_parallel(size, [&](std::uint32_t y) {
+        for (std::uint32_t x = 0; x < size; ++x) {
+            const double u = ((x + 0.5) / size * 2.0 - 1.0) * ball_margin,
+                         v = (1.0 - (y + 0.5) / size * 2.0) * ball_margin;
+            const double squared = u * u + v * v;
+            glm::dvec3 color(0.18);
+            if (squared < 1.0) color = radiance(glm::dvec3(u, v, std::sqrt(1.0 - squared)), x, y);
+            for (int channel = 0; channel < 3; ++channel)
+                image.texel(x, y)[channel] =
+                    static_cast<float>(std::min(color[channel] / (1.0 + color[channel] * 0.25), 1.0));
+        }
+    });
+    return image;
+}
+
 }  // namespace
 
 glm::dvec3 preview_sky(const glm::dvec3& direction) { return ambient_sky(direction) + soft_box.radiance(direction); }
 
-Image preview_ball(const FlattenedTree& tree, std::uint32_t size) {
-    Image image{.width = size, .height = size, .channels = 3};
-    image.pixels.resize(std::size_t{3} * size * size);
-    std::atomic<std::uint32_t> next{0};
-    const auto work = [&] {
-        for (std::uint32_t y = next++; y < size; y = next++) {
-            for (std::uint32_t x = 0; x < size; ++x) {
-                const double u = ((x + 0.5) / size * 2.0 - 1.0) * 1.04, v = (1.0 - (y + 0.5) / size * 2.0) * 1.04;
-                const double squared = u * u + v * v;
-                glm::dvec3 color(0.18);
-                if (squared < 1.0) {
-                    const glm::dvec3 normal(u, v, std::sqrt(1.0 - squared));
-                    // A pixel covers more of the surface where that turns away.
-                    color = radiance(tree, normal, ball_diameter / size / std::max(normal.z, 0.05), x, y);
-                }
-                for (int channel = 0; channel < 3; ++channel)
-                    image.texel(x, y)[channel] =
-                        static_cast<float>(std::min(color[channel] / (1.0 + color[channel] * 0.25), 1.0));
-            }
-        }
+Image preview_ball(const FlattenedTree& tree, std::uint32_t size, int strata) {
+    return ball_of(size, [&](const glm::dvec3& normal, std::uint32_t x, std::uint32_t y) {
+        // A pixel covers more of the surface where that turns away.
+        return radiance(tree, normal, ball_diameter / size / std::max(normal.z, 0.05), x, y, strata);
+    });
+}
+
+Image walked_ball(const RandomWalk& walk, std::uint32_t size, std::uint32_t paths) {
+    const auto walked = [&](const glm::dvec3& view, std::uint32_t count, std::uint64_t seed) {
+        RandomWalk::Generator random(seed);
+        std::vector<WalkExit> exits(count);
+        for (WalkExit& path : exits) path = walk.walk(view, random);
+        return exits;
     };
-    {
-        std::vector<std::jthread> threads;
-        for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) threads.emplace_back(work);
-        work();
+    const auto sent = [](const std::vector<WalkExit>& exits, const Frame& frame) {
+        glm::dvec3 sum(0.0);
+        for (const WalkExit& path : exits) {
+            if (path.direction.z > 0.0)
+                sum += path.weight * preview_sky(frame.to_world(path.direction));
+            else if (path.direction.z < 0.0)
+                sum += path.weight * preview_sky({0, 0, -1});
+        }
+        return sum / static_cast<double>(exits.size());
+    };
+    if (!walk.is_isotropic()) {
+        return ball_of(size, [&](const glm::dvec3& normal, std::uint32_t x, std::uint32_t y) {
+            const Frame frame = frame_at(normal);
+            return sent(walked(frame.to_local({0, 0, 1}), std::max(paths / 16, 1u), std::uint64_t{y} * size + x),
+                        frame);
+        });
     }
-    return image;
+    // Rings of equal angle between view and normal, half a pixel wide; the x axis points to the viewer.
+    std::vector<std::vector<WalkExit>> rings(size);
+    for_each_parallel(size, [&](std::uint32_t ring) {
+        const double radius = (ring + 0.5) / size;
+        rings[ring] = walked({radius, 0.0, std::sqrt(1.0 - radius * radius)}, std::max(paths, 1u), ring);
+    });
+    return ball_of(size, [&](const glm::dvec3& normal, std::uint32_t, std::uint32_t) {
+        const double radius = std::hypot(normal.x, normal.y);
+        Frame frame = frame_at(normal);
+        if (radius > 1e-9) {
+            frame.tangent = glm::normalize(glm::dvec3(0, 0, 1) - normal * normal.z);
+            frame.bitangent = glm::cross(normal, frame.tangent);
+        }
+        return sent(rings[std::min(static_cast<std::uint32_t>(radius * size), size - 1)], frame);
+    });
 }
 
 }  // namespace nacre::materials

@@ -63,6 +63,8 @@ constexpr StorageFormat formats[] = {
     {StorageValue::weight, "weight", color_bits, StorageCodec::color},
     {StorageValue::path_transmittance, "path transmittance", color_bits, StorageCodec::color},
     {StorageValue::path_uncovered, "path uncovered", 6, StorageCodec::unit},
+    {StorageValue::path_spread, "path spread", 6, StorageCodec::unit},
+    {StorageValue::path_under_interface, "path under interface", 6, StorageCodec::unit},
 };
 
 // Fields of features, in the order of the stream.
@@ -108,6 +110,8 @@ void for_each_closure_field(std::uint32_t index, std::uint32_t closure_count, st
         field(StorageValue::weight);
         field(StorageValue::path_transmittance);
         field(StorageValue::path_uncovered);
+        field(StorageValue::path_spread);
+        field(StorageValue::path_under_interface);
     } else if (closure_count > 1) {
         field(StorageValue::grey_weight);
     }
@@ -347,7 +351,7 @@ StorageLayout storage_layout(const FlattenedTree& tree, const StorageOptions& op
 std::uint32_t pack_subsurface(const Library::Slab& slab, glm::uvec2 position) {
     std::uint32_t word = 0;
     for (int channel = 0; channel < 3; ++channel) {
-        const double similarity = library.medium_similarity(slab.albedo[channel]);
+        const double similarity = library.medium_similarity(slab.albedo[channel], 1.0 - slab.albedo[channel]);
         const double isotropic = slab.mean_free_path[channel] *
                                  (1.0 - slab.phase_anisotropy * similarity * similarity) / (1.0 - slab.phase_anisotropy);
         word |= library.pack_logarithm(isotropic, 8, shortest_path, std::log2(longest_path / shortest_path),
@@ -437,6 +441,14 @@ StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, co
                                      (closure->path.uncovered.r + closure->path.uncovered.g + closure->path.uncovered.b) / 3.0,
                                      next_dither());
                 break;
+            case StorageValue::path_spread:
+                code = encode_number(format, field.bits,
+                                     (closure->path.spread.r + closure->path.spread.g + closure->path.spread.b) / 3.0,
+                                     next_dither());
+                break;
+            case StorageValue::path_under_interface:
+                code = encode_number(format, field.bits, closure->path.under_interface, next_dither());
+                break;
             default: {
                 Library::Slab slab = closure->slab;
                 if (const glm::dvec3* value = color_of(slab, field.value)) {
@@ -518,6 +530,10 @@ Expected<UnpackedMaterial> unpack_pixel(const StoredPixel& pixel) {
                 result.path.transmittance = library.unpack_color(code);
             } else if (value == StorageValue::path_uncovered) {
                 result.path.uncovered = glm::dvec3(decode_number(format, format.bits, code));
+            } else if (value == StorageValue::path_spread) {
+                result.path.spread = glm::dvec3(decode_number(format, format.bits, code));
+            } else if (value == StorageValue::path_under_interface) {
+                result.path.under_interface = decode_number(format, format.bits, code);
             } else if (value == StorageValue::medium_transmittance) {
                 const glm::dvec3 transmittance = library.unpack_color(code);
                 for (int channel = 0; channel < 3; ++channel) {

@@ -192,6 +192,11 @@ class Writer {
             case StorageValue::path_uncovered:
                 return encode(format, field.bits,
                               fmt::format("dot(state.paths[{}].uncovered, vec3(1.0 / 3.0))", closure), next_dither());
+            case StorageValue::path_spread:
+                return encode(format, field.bits, fmt::format("dot(state.paths[{}].spread, vec3(1.0 / 3.0))", closure),
+                              next_dither());
+            case StorageValue::path_under_interface:
+                return encode(format, field.bits, fmt::format("state.paths[{}].under_interface", closure), next_dither());
             default: break;
         }
         const std::string value = fmt::format("state.slabs[{}].{}", closure, member_of(field.value));
@@ -330,6 +335,8 @@ StoredClosure read_stored_closure(inout StoredHeader header, uint index, float t
         closure.path.weight = {};
         closure.path.transmittance = {};
         closure.path.uncovered = vec3({});
+        closure.path.spread = vec3({});
+        closure.path.under_interface = {};
 #endif
     }} else if (header.closure_count > 1u) {{
         closure.path.weight = vec3({});
@@ -341,7 +348,8 @@ StoredClosure read_stored_closure(inout StoredHeader header, uint index, float t
 #endif
 )",
           read(StorageValue::medium_transmittance), read(StorageValue::weight), read(StorageValue::path_transmittance),
-          read(StorageValue::path_uncovered), read(StorageValue::grey_weight));
+          read(StorageValue::path_uncovered), read(StorageValue::path_spread), read(StorageValue::path_under_interface),
+          read(StorageValue::grey_weight));
     return text;
 }
 

@@ -134,22 +134,22 @@ class Flattener {
 
     // From the root: slabs below a layer are rougher. Closures are made of what this leaves, so that what they reflect
     // and what they let through are of one kind.
-    void track(NodeIndex index, std::uint32_t variance, bool is_bottom) {
+    void track(NodeIndex index, std::uint32_t widening, bool is_bottom) {
         const Node& node = tree_.nodes[index];
         NodeState& state = nodes_[index];
         if (state.is_one_slab) {
-            if (variance == 0) return;
+            if (widening == 0) return;
             // Its own spread is that of its interface as it is.
             if (!is_bottom) spread(index);
-            state.slab = step({.kind = StepKind::track_slab, .a = state.slab, .b = variance}, topology_.slab_registers);
+            state.slab = step({.kind = StepKind::track_slab, .a = state.slab, .b = widening}, topology_.slab_registers);
             return;
         }
-        track(node.first, variance, is_bottom && node.kind != NodeKind::layer);
+        track(node.first, widening, is_bottom && node.kind != NodeKind::layer);
         if (node.kind == NodeKind::coverage) return;
         if (node.kind == NodeKind::layer)
-            variance = step({.kind = StepKind::variance_below, .a = variance, .b = spread(node.first)},
-                            topology_.variance_registers);
-        track(node.second, variance, is_bottom);
+            widening = step({.kind = StepKind::widening_below, .a = widening, .b = spread(node.first)},
+                            topology_.widening_registers);
+        track(node.second, widening, is_bottom);
     }
 
     // The matter of a subtree, made when it is first asked for.

@@ -29,8 +29,8 @@ enum class StepKind : std::uint8_t {
     cover_spread,        ///< spread: a with less coverage
     mix_spread,          ///< spread: a and b side by side
     layer_spread,        ///< spread: a over b
-    variance_below,      ///< variance: below spread b, where a is that above it
-    track_slab,          ///< slab: a, as rough as it is seen through variance b
+    widening_below,      ///< widening: below spread b, where a is that above it
+    track_slab,          ///< slab: a, as rough as it is seen through widening b
     slab_matter,         ///< matter: of slab a, everything
     base_matter,         ///< matter: of slab a, only what a layer above needs: coverage and albedo
     cover_matter,        ///< matter: a with less coverage
@@ -73,7 +73,7 @@ struct Topology {
     std::vector<std::uint32_t> frames;  ///< Tangent frames that the closures use, each once: indices into Tree::frames.
     std::uint32_t slab_registers = 0, matter_registers = 0;
     std::uint32_t path_registers = 1;      ///< Register 0 is the open path.
-    std::uint32_t variance_registers = 1;  ///< Register 0 is none.
+    std::uint32_t widening_registers = 1;  ///< Register 0 is none.
     std::uint32_t spread_registers = 0;
     std::uint32_t whole = 0;     ///< Matter of the whole tree: its coverage and transmittance decide how it is blended.
     std::uint32_t top = 0;       ///< Matter of the topmost layer alone.

@@ -152,7 +152,7 @@ class Printer {
         print("\nTreeState shade_tree(vec3 views[{}], float footprint) {{\n", topology_.frames.size());
         for (std::size_t i = 0; i < topology_.amounts.size(); ++i)
             print("    float amount_{0} = tree_amount_{0}();\n", i);
-        print("    Path path_0 = open_path();\n    float variance_0 = 0.0;\n");
+        print("    Path path_0 = open_path();\n    Widening widening_0 = no_widening();\n");
         for (const Step& step : topology_.steps) {
             const std::string amount = step.amount == Step::none ? std::string()
                                        : step.complement         ? fmt::format("1.0 - amount_{}", step.amount)
@@ -184,12 +184,12 @@ class Printer {
                 case StepKind::layer_spread:
                     print("    Spread spread_{} = layer_spread(spread_{}, spread_{});\n", step.result, step.a, step.b);
                     break;
-                case StepKind::variance_below:
-                    print("    float variance_{} = variance_below(variance_{}, spread_{});\n", step.result, step.a,
+                case StepKind::widening_below:
+                    print("    Widening widening_{} = widening_below(widening_{}, spread_{});\n", step.result, step.a,
                           step.b);
                     break;
                 case StepKind::track_slab:
-                    print("    Slab slab_{} = track_slab(slab_{}, variance_{});\n", step.result, step.a, step.b);
+                    print("    Slab slab_{} = track_slab(slab_{}, widening_{});\n", step.result, step.a, step.b);
                     break;
                 case StepKind::slab_matter:
                     print(
@@ -215,7 +215,7 @@ class Printer {
                     print("    Path path_{} = path_through_mix(path_{}, {});\n", step.result, step.a, amount);
                     break;
                 case StepKind::path_through_layer:
-                    print("    Path path_{} = path_through_layer(path_{}, matter_{}, matter_{}.albedo);\n", step.result,
+                    print("    Path path_{} = path_through_layer(path_{}, matter_{}, matter_{});\n", step.result,
                           step.a, step.b, step.c);
                     break;
             }
@@ -241,15 +241,21 @@ class Printer {
         for (std::size_t i = 0; i < topology_.closures.size(); ++i) {
             const TopologyClosure& closure = topology_.closures[i];
             const std::size_t slot = frame_slot(closure.frame);
+            // Layers change nothing of what lies open.
+            const std::string open = fmt::format("prepare_closure(slab, views[{}], footprint)", slot);
+            const std::string prepared =
+                closure.path == 0
+                    ? open
+                    : fmt::format("cover_closure({0}, state.paths[{1}].spread, state.paths[{1}].under_interface)", open,
+                                  i);
             print(
                 "    vec3 weight_{0} = state.paths[{0}].weight * state.coverages[{0}];\n"
                 "    if (largest(weight_{0}) > 0.0) {{\n"
                 "        Slab slab = state.slabs[{0}];\n        slab.features = {1}u;\n"
-                "        ClosureValue value = evaluate_closure(prepare_closure(slab, views[{2}], footprint), "
-                "lights[{2}]);\n"
+                "        ClosureValue value = evaluate_closure({3}, lights[{2}]);\n"
                 "        sum += (value.specular + value.diffuse + value.subsurface) * weight_{0} * "
                 "top_transmittance(state.paths[{0}], lights[{2}].z);\n    }}\n",
-                i, closure.features, slot);
+                i, closure.features, slot, prepared);
         }
         print("    return sum;\n}}\n");
     }

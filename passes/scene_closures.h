@@ -67,6 +67,12 @@ class SceneClosures {
         bool has_subsurface = false;
         std::uint32_t slices = 0;         ///< Of the storage image: words beyond the second; last, subsurface data.
         std::uint32_t bytes = 12;         ///< Largest of a pixel.
+
+        /// Whether shading what is stored reads a table (by number).
+        [[nodiscard]] bool reads_table(std::uint32_t table) const {
+            constexpr std::uint32_t needed_by[closure_table_count] = {~0u, materials::slab_medium, materials::slab_anisotropy};
+            return table == 0 || (features & needed_by[table]) != 0;
+        }
     };
     [[nodiscard]] const Lighting& lighting() const { return lighting_; }
     /// Which tables the materials' shaders read: bits 0 to 2 as closure_table_count tells.

@@ -93,6 +93,7 @@ struct BackendBinding {
     BindingType type = BindingType::uniform_buffer;
     BackendBuffer* buffer = nullptr;
     std::uint64_t offset = 0, size = 0;
+    Format format = Format::undefined;  ///< Texel buffers; `size` is a whole number of elements of it.
     ViewReference view{};  ///< texture.object set for textures and images.
     BackendSampler* sampler = nullptr;
     BackendAccelerationStructure* acceleration_structure = nullptr;

@@ -19,7 +19,8 @@ namespace {
                 X(subgroup_operations) X(shader_float64) X(shader_int64) X(shader_int16) X(shader_int8)              \
                     X(variable_pointers) X(float_atomics) X(integer_dot_product) X(subgroup_rotate)                  \
                     X(sample_rate_shading) X(block_compression) X(float_color_targets) X(ray_query) X(base_instance) \
-                        X(texture_views) X(texture_view_formats) X(fill_storage_without_format) X(sampler_mip_bias)
+                        X(texture_views) X(texture_view_formats) X(fill_storage_without_format) X(sampler_mip_bias)  \
+                        X(texel_buffers)
 #define NACRE_LIMITS(X)                                                                                                \
     X(max_texture_1d)                                                                                                  \
     X(max_texture_2d) X(max_texture_3d) X(max_texture_cube) X(max_texture_layers) X(max_color_targets)                 \
@@ -29,8 +30,8 @@ namespace {
                     X(max_sampled_textures) X(max_samplers) X(max_storage_images) X(max_workgroup_size)                \
                         X(max_workgroup_count) X(max_workgroup_invocations) X(max_workgroup_memory_bytes)              \
                             X(subgroup_size) X(max_bindless_textures) X(max_anisotropy) X(max_line_width)              \
-                                X(max_point_size) X(float_bits)
-#define NACRE_ALIGNMENTS(X) X(uniform_offset_alignment) X(storage_offset_alignment)
+                                X(max_point_size) X(float_bits) X(max_texel_buffer_elements)
+#define NACRE_ALIGNMENTS(X) X(uniform_offset_alignment) X(storage_offset_alignment) X(texel_buffer_offset_alignment)
 #define NACRE_MEASURES(X) X(timestamp_period_ns) X(device_memory_bytes)
 
 template <typename T>
@@ -67,7 +68,7 @@ constexpr FormatSupport vertex = FormatSupport::vertex;
 /// tables 20.40 to 20.49. Where a value of ours has no counterpart there, the reason stands beside it.
 Capabilities gles31_minimum() {
     Capabilities c;
-    // All features are off: each needs an extension or OpenGL ES 3.2, but for these.
+    // All features are off (buffer textures among them): each needs an extension or OpenGL ES 3.2, but for these.
     c.precise_occlusion = false;    // ANY_SAMPLES_PASSED alone.
     c.float_color_targets = false;  // EXT_color_buffer_half_float and EXT_color_buffer_float are extensions.
 
@@ -131,9 +132,10 @@ Capabilities gles31_minimum() {
 }
 
 std::string text_of(FormatSupport support) {
-    static constexpr std::array<std::string_view, 9> names{"sampled", "filtered",     "color_target",
-                                                           "blended", "depth_target", "storage_image",
-                                                           "vertex",  "multisampled", "storage_atomic"};
+    static constexpr std::array<std::string_view, 12> names{
+        "sampled", "filtered",     "color_target",   "blended",              "depth_target",         "storage_image",
+        "vertex",  "multisampled", "storage_atomic", "uniform_texel_buffer", "storage_texel_buffer",
+        "storage_texel_buffer_atomic"};
     std::string text;
     for (std::size_t i = 0; i < names.size(); ++i)
         if (static_cast<std::uint32_t>(support) >> i & 1) text += (text.empty() ? "" : " ") + std::string(names[i]);

@@ -48,6 +48,7 @@ struct Capabilities {
     bool texture_view_formats = false;  ///< A view may reinterpret its texture's format (same size).
     bool fill_storage_without_format = false;  ///< imageStore to images declared without a format.
     bool sampler_mip_bias = false;      ///< SamplerDesc::mip_bias other than 0 (a bias in the shader always works).
+    bool texel_buffers = false;         ///< BindingType::uniform_texel_buffer and *storage_texel_buffer.
 
     // Limits.
     std::uint32_t max_texture_1d = 0;
@@ -66,15 +67,17 @@ struct Capabilities {
     std::uint64_t max_buffer_size = 0;
     std::uint32_t uniform_offset_alignment = 256;
     std::uint32_t storage_offset_alignment = 256;
+    std::uint32_t texel_buffer_offset_alignment = 256;  ///< Bytes.
+    std::uint32_t max_texel_buffer_elements = 0;        ///< In the range of one texel buffer; 0 without texel_buffers.
     std::uint32_t max_vertex_attributes = 0;
     std::uint32_t max_vertex_buffers = 0;
     std::uint32_t max_vertex_stride = 0;
     /// Per-stage limits in the order vertex, fragment, compute.
     std::array<std::uint32_t, 3> max_uniform_buffers{};
     std::array<std::uint32_t, 3> max_storage_buffers{};
-    std::array<std::uint32_t, 3> max_sampled_textures{};
+    std::array<std::uint32_t, 3> max_sampled_textures{};  ///< With uniform texel buffers.
     std::array<std::uint32_t, 3> max_samplers{};
-    std::array<std::uint32_t, 3> max_storage_images{};
+    std::array<std::uint32_t, 3> max_storage_images{};    ///< With storage texel buffers.
     std::array<std::uint32_t, 3> max_workgroup_size{};   ///< x, y, z.
     std::array<std::uint32_t, 3> max_workgroup_count{};  ///< x, y, z.
     std::uint32_t max_workgroup_invocations = 0;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "rhi/binding_type.h"
 #include "rhi/command_validator.h"
 
 namespace nacre::rhi {
@@ -14,6 +15,15 @@ FormatKind shader_kind(const FormatInfo& format) { return format.is_integer() ? 
 
 std::string_view name_of_kind(FormatKind kind) {
     return kind == FormatKind::uint ? "uint" : kind == FormatKind::sint ? "sint" : "float";
+}
+
+/// What a shader expects of the format at a binding; empty where this one is that.
+std::string unmet_format(const ReflectedBinding& declared, Format format) {
+    if (declared.image_format != Format::undefined && declared.image_format != format)
+        return fmt::format("format {}", info(declared.image_format).name);
+    if (shader_kind(info(format)) != declared.sampled_kind)
+        return fmt::format("a format that gives {}", name_of_kind(declared.sampled_kind));
+    return {};
 }
 
 }  // namespace
@@ -26,12 +36,21 @@ Check CommandValidator::check_group_content(const PipelineCommon& pipeline, cons
     };
     for (const ReflectedBinding& declared : pipeline.bindings) {
         if (declared.set != index) continue;
-        for (const BufferUse& use : group.buffers)
-            if (use.binding == declared.binding && use.size < declared.block_size)
+        for (const BufferUse& use : group.buffers) {
+            if (use.binding != declared.binding) continue;
+            if (use.size < declared.block_size)
                 return problem(Rule::binding_size, attempted,
                                fmt::format("expected at least {} bytes, as the shader declares, found {}",
                                            declared.block_size, use.size),
                                "Make the buffer or the bound range larger.", subject(declared));
+            if (!is_texel_buffer(declared.type)) continue;
+            if (const std::string expected = unmet_format(declared, use.format); !expected.empty())
+                return problem(Rule::binding_view, attempted,
+                               fmt::format("expected {} as the shader declares, found {}", expected,
+                                           info(use.format).name),
+                               "Give the texel buffer the format that the shader declares, or change the shader.",
+                               subject(declared));
+        }
         for (const TextureUse& use : group.textures) {
             if (use.binding != declared.binding || !use.slot->occupied || use.slot->generation != use.generation)
                 continue;
@@ -48,12 +67,8 @@ Check CommandValidator::check_group_content(const PipelineCommon& pipeline, cons
             if (declared.multisampled != (desc.samples > 1))
                 return wrong(declared.multisampled ? "several samples" : "1 sample",
                              fmt::format("{} samples", desc.samples));
-            const FormatInfo& format = info(use.format);
-            if (declared.image_format != Format::undefined && declared.image_format != use.format)
-                return wrong(fmt::format("format {}", info(declared.image_format).name), std::string(format.name));
-            if (shader_kind(format) != declared.sampled_kind)
-                return wrong(fmt::format("a format that gives {}", name_of_kind(declared.sampled_kind)),
-                             std::string(format.name));
+            if (std::string expected = unmet_format(declared, use.format); !expected.empty())
+                return wrong(std::move(expected), std::string(info(use.format).name));
         }
     }
     return {};

@@ -3,35 +3,25 @@
 
 #include <algorithm>
 
+#include "rhi/binding_type.h"
 #include "rhi/device_access.h"
 #include "rhi/object_checks.h"
 
 namespace nacre::rhi {
 namespace {
 
-bool is_buffer(BindingType type) {
-    return type == BindingType::uniform_buffer || type == BindingType::storage_buffer ||
-           type == BindingType::readonly_storage_buffer;
-}
-bool is_image(BindingType type) {
-    return type == BindingType::storage_image || type == BindingType::readonly_storage_image ||
-           type == BindingType::writeonly_storage_image;
-}
-bool has_texture(BindingType type) {
-    return is_image(type) || type == BindingType::sampled_texture || type == BindingType::combined_texture_sampler;
-}
-bool has_sampler(BindingType type) {
-    return type == BindingType::sampler || type == BindingType::combined_texture_sampler;
-}
-
 ResourceUse use_of(BindingType type) {
     switch (type) {
         case BindingType::uniform_buffer: return ResourceUse::uniform_buffer;
         case BindingType::storage_buffer:
+        case BindingType::storage_texel_buffer:
         case BindingType::storage_image: return ResourceUse::storage_read | ResourceUse::storage_write;
         case BindingType::readonly_storage_buffer:
+        case BindingType::readonly_storage_texel_buffer:
         case BindingType::readonly_storage_image: return ResourceUse::storage_read;
+        case BindingType::writeonly_storage_texel_buffer:
         case BindingType::writeonly_storage_image: return ResourceUse::storage_write;
+        case BindingType::uniform_texel_buffer:
         case BindingType::sampled_texture:
         case BindingType::combined_texture_sampler: return ResourceUse::sampled;
         case BindingType::acceleration_structure: return ResourceUse::acceleration_structure_read;
@@ -63,6 +53,9 @@ class GroupBuilder {
                 std::move(remedy)};
     }
     Check add_buffer(const BindGroupEntry& entry, const BindingLayout& binding, BackendBinding& resolved);
+    /// The range of a texel buffer, of which `size` bytes are left or asked for; `size` becomes a whole number of
+    /// elements.
+    Check check_texels(const BindGroupEntry& entry, BindingType type, const BufferDesc& buffer, std::uint64_t& size);
     Check add_texture(const BindGroupEntry& entry, const BindingLayout& binding, BackendBinding& resolved,
                       const SamplerDesc* sampler);
 
@@ -87,7 +80,7 @@ Check GroupBuilder::add(const BindGroupEntry& entry) {
         return problem(Rule::group_element, entry.binding,
                        fmt::format("expected an element below {}, found {}", count, entry.element),
                        "Correct BindGroupEntry::element.");
-    const bool wrong = (static_cast<bool>(entry.buffer) != is_buffer(binding.type)) ||
+    const bool wrong = (static_cast<bool>(entry.buffer) != has_buffer(binding.type)) ||
                        (static_cast<bool>(entry.texture.texture) != has_texture(binding.type)) ||
                        (static_cast<bool>(entry.sampler) != has_sampler(binding.type)) ||
                        (static_cast<bool>(entry.acceleration_structure) !=
@@ -141,20 +134,28 @@ Check GroupBuilder::add_buffer(const BindGroupEntry& entry, const BindingLayout&
     if (!slot) return handle_problem(tables_.buffers, entry.buffer, "create bind group", "buffer");
     const BufferDesc& buffer = slot->object.desc;
     const Capabilities& capabilities = device_.capabilities();
-    const bool uniform = binding.type == BindingType::uniform_buffer;
-    const BufferUsage needed = uniform ? BufferUsage::uniform : BufferUsage::storage;
+    const bool uniform = binding.type == BindingType::uniform_buffer, texels = is_texel_buffer(binding.type);
+    const BufferUsage needed = uniform                                               ? BufferUsage::uniform
+                               : binding.type == BindingType::uniform_texel_buffer ? BufferUsage::uniform_texel
+                               : texels                                              ? BufferUsage::storage_texel
+                                                                                     : BufferUsage::storage;
     if (!has_all(buffer.usage, needed))
         return problem(Rule::group_buffer_usage, entry.binding,
                        fmt::format("expected buffer '{}' to have usage {}, found {}", buffer.name, text_of(needed),
                                    text_of(buffer.usage)),
                        "Add the usage where the buffer is created.");
-    const std::uint32_t alignment =
-        uniform ? capabilities.uniform_offset_alignment : capabilities.storage_offset_alignment;
+    const std::uint32_t alignment = uniform  ? capabilities.uniform_offset_alignment
+                                    : texels ? capabilities.texel_buffer_offset_alignment
+                                             : capabilities.storage_offset_alignment;
     if (alignment != 0 && entry.offset % alignment != 0)
         return problem(
             Rule::group_alignment, entry.binding,
             fmt::format("expected an offset into buffer '{}' that is a multiple of {} ({}), found {}", buffer.name,
-                        alignment, uniform ? "uniform_offset_alignment" : "storage_offset_alignment", entry.offset),
+                        alignment,
+                        uniform  ? "uniform_offset_alignment"
+                        : texels ? "texel_buffer_offset_alignment"
+                                 : "storage_offset_alignment",
+                        entry.offset),
             "Align the offset.");
     if (entry.offset >= buffer.size)
         return problem(Rule::group_range, entry.binding,
@@ -162,14 +163,18 @@ Check GroupBuilder::add_buffer(const BindGroupEntry& entry, const BindingLayout&
                                    buffer.name, entry.offset),
                        "Correct the offset.");
     const std::uint64_t left = buffer.size - entry.offset;
-    const std::uint64_t size = entry.size == ~0ull ? left : entry.size;
+    std::uint64_t size = entry.size == ~0ull ? left : entry.size;
     if (size == 0 || size > left)
         return problem(Rule::group_range, entry.binding,
                        fmt::format("expected 1 to {} bytes of buffer '{}' from offset {}, found {}", left, buffer.name,
                                    entry.offset, size),
                        "Correct offset and size.");
+    if (texels) {
+        if (Check failed = check_texels(entry, binding.type, buffer, size)) return failed;
+        resolved.format = entry.format;
+    }
     const std::uint64_t limit = uniform ? capabilities.max_uniform_buffer_range : capabilities.max_storage_buffer_range;
-    if (size > limit)
+    if (!texels && size > limit)
         return problem(
             Rule::group_range_limit, entry.binding,
             fmt::format("expected at most {} bytes ({}), found {} of buffer '{}'", limit,
@@ -178,8 +183,42 @@ Check GroupBuilder::add_buffer(const BindGroupEntry& entry, const BindingLayout&
     resolved.buffer = slot->object.backend.get();
     resolved.offset = entry.offset;
     resolved.size = size;
-    object.buffers.push_back(
-        {slot, slot->generation, entry.binding, {use_of(binding.type), binding.stages}, entry.offset, size});
+    object.buffers.push_back({slot,
+                              slot->generation,
+                              entry.binding,
+                              {use_of(binding.type), binding.stages},
+                              entry.offset,
+                              size,
+                              resolved.format});
+    return {};
+}
+
+Check GroupBuilder::check_texels(const BindGroupEntry& entry, BindingType type, const BufferDesc& buffer,
+                                 std::uint64_t& size) {
+    const Capabilities& capabilities = device_.capabilities();
+    const FormatInfo& format = info(entry.format);
+    const FormatSupport needed = type == BindingType::uniform_texel_buffer ? FormatSupport::uniform_texel_buffer
+                                                                           : FormatSupport::storage_texel_buffer;
+    if (entry.format == Format::undefined || !capabilities.supports(entry.format, needed))
+        return problem(Rule::group_texel_format, entry.binding,
+                       fmt::format("expected a format that the device supports as {} for buffer '{}', found {}",
+                                   type == BindingType::uniform_texel_buffer ? "uniform_texel_buffer"
+                                                                             : "storage_texel_buffer",
+                                   buffer.name, entry.format == Format::undefined ? "none" : format.name),
+                       "Set BindGroupEntry::format to one for which Capabilities::supports says so.");
+    const std::uint64_t elements = size / format.block_bytes;
+    if (elements == 0 || (entry.size != ~0ull && size % format.block_bytes != 0))
+        return problem(
+            Rule::group_texel_range, entry.binding,
+            fmt::format("expected a whole number of elements of {} bytes ({}) of buffer '{}', found {} bytes",
+                        format.block_bytes, format.name, buffer.name, size),
+            "Make BindGroupEntry::size a multiple of the bytes of an element.");
+    if (elements > capabilities.max_texel_buffer_elements)
+        return problem(Rule::group_range_limit, entry.binding,
+                       fmt::format("expected at most {} elements (max_texel_buffer_elements), found {} of buffer '{}'",
+                                   capabilities.max_texel_buffer_elements, elements, buffer.name),
+                       "Bind a smaller range.");
+    size = elements * format.block_bytes;
     return {};
 }
 
@@ -189,7 +228,7 @@ Check GroupBuilder::add_texture(const BindGroupEntry& entry, const BindingLayout
     if (!slot) return handle_problem(tables_.textures, entry.texture.texture, "create bind group", "texture");
     const TextureDesc& texture = slot->object.desc;
     const Capabilities& capabilities = device_.capabilities();
-    const bool image = is_image(binding.type);
+    const bool image = is_storage_image(binding.type);
     const TextureUsage needed = image ? TextureUsage::storage : TextureUsage::sampled;
     if (!has_all(texture.usage, needed))
         return problem(Rule::group_texture_usage, entry.binding,

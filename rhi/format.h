@@ -19,7 +19,7 @@ enum class Format : std::uint8_t {
     rgba16_unorm, rgba16_snorm, rgba16_uint, rgba16_sint, rgba16_float,
     r32_uint, r32_sint, r32_float,
     rg32_uint, rg32_sint, rg32_float,
-    rgb32_uint, rgb32_sint, rgb32_float,  ///< Vertex attributes only.
+    rgb32_uint, rgb32_sint, rgb32_float,  ///< Vertex attributes; on some devices uniform texel buffers.
     rgba32_uint, rgba32_sint, rgba32_float,
     rgb10a2_unorm, rgb10a2_uint, rg11b10_float, rgb9e5_float,
     d16_unorm, d32_float, d24_unorm_s8_uint, d32_float_s8_uint,
@@ -64,6 +64,9 @@ enum class FormatSupport : std::uint32_t {
     vertex = 64,          ///< Vertex attribute.
     multisampled = 128,   ///< 4 samples as a color or depth target.
     storage_atomic = 256, ///< imageAtomic* in compute shaders.
+    uniform_texel_buffer = 512,   ///< Elements of BindingType::uniform_texel_buffer.
+    storage_texel_buffer = 1024,  ///< Elements of storage texel buffers: imageLoad and imageStore in compute shaders.
+    storage_texel_buffer_atomic = 2048,  ///< imageAtomic* on them.
 };
 constexpr FormatSupport operator|(FormatSupport a, FormatSupport b) {
     return static_cast<FormatSupport>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));

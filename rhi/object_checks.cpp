@@ -7,6 +7,8 @@
 #include <array>
 #include <cmath>
 
+#include "rhi/binding_type.h"
+
 namespace nacre::rhi {
 namespace {
 
@@ -18,9 +20,9 @@ std::string quoted(std::string_view kind, const std::string& name) { return fmt:
 }  // namespace
 
 std::string text_of(BufferUsage usage) {
-    static constexpr std::array<std::string_view, 8> names{
+    static constexpr std::array<std::string_view, 10> names{
         "vertex", "index", "uniform", "storage", "indirect", "copy_source", "copy_destination",
-        "acceleration_structure_input"};
+        "acceleration_structure_input", "uniform_texel", "storage_texel"};
     std::string text;
     for (std::size_t i = 0; i < names.size(); ++i)
         if (static_cast<std::uint32_t>(usage) >> i & 1) text += (text.empty() ? "" : " | ") + std::string(names[i]);
@@ -48,6 +50,10 @@ std::string_view name_of(BindingType type) {
         case BindingType::readonly_storage_image: return "readonly_storage_image";
         case BindingType::writeonly_storage_image: return "writeonly_storage_image";
         case BindingType::acceleration_structure: return "acceleration_structure";
+        case BindingType::uniform_texel_buffer: return "uniform_texel_buffer";
+        case BindingType::storage_texel_buffer: return "storage_texel_buffer";
+        case BindingType::readonly_storage_texel_buffer: return "readonly_storage_texel_buffer";
+        case BindingType::writeonly_storage_texel_buffer: return "writeonly_storage_texel_buffer";
     }
     return "unknown";
 }
@@ -86,12 +92,18 @@ Check check_buffer(const BufferDesc& desc, const Capabilities& capabilities) {
         return problem(Rule::buffer_usage, ErrorCode::unsupported,
                        "expected no acceleration_structure_input on a device without ray_query, found it asked for",
                        "Ask Capabilities::ray_query first.");
+    constexpr BufferUsage texel_usages = BufferUsage::uniform_texel | BufferUsage::storage_texel;
+    if (has_any(desc.usage, texel_usages) && !capabilities.texel_buffers)
+        return problem(Rule::buffer_usage, ErrorCode::unsupported,
+                       "expected no uniform_texel or storage_texel on a device without texel_buffers, found " +
+                           text_of(desc.usage & texel_usages),
+                       "Ask Capabilities::texel_buffers first; read a storage buffer or a texture instead.");
     constexpr BufferUsage copies = BufferUsage::copy_source | BufferUsage::copy_destination;
     if (desc.memory == MemoryKind::readback && has_any(desc.usage, ~copies))
         return problem(Rule::buffer_usage, ErrorCode::invalid_argument,
                        "expected readback memory to be used by copies alone, found " + text_of(desc.usage),
                        "Use device memory, and copy what the host reads into a readback buffer.");
-    if (desc.memory == MemoryKind::upload && has_any(desc.usage, BufferUsage::storage))
+    if (desc.memory == MemoryKind::upload && has_any(desc.usage, BufferUsage::storage | BufferUsage::storage_texel))
         return problem(Rule::buffer_usage, ErrorCode::invalid_argument,
                        "expected upload memory not to be used by storage bindings, found " + text_of(desc.usage),
                        "Use device memory for storage buffers, and copy into them.");
@@ -441,11 +453,18 @@ Check check_layout(const BindGroupLayoutDesc& desc, const Capabilities& capabili
                     "Use TextureTable, which works on every device, or give a count.");
         }
     }
-    for (const BindingLayout& binding : desc.bindings)
+    for (const BindingLayout& binding : desc.bindings) {
         if (binding.type == BindingType::acceleration_structure && !capabilities.ray_query)
             return problem(Rule::acceleration_structure_unsupported, ErrorCode::unsupported, binding,
                            "expected no acceleration structure on a device without ray_query, found one",
                            "Ask Capabilities::ray_query first.");
+        if (is_texel_buffer(binding.type) && !capabilities.texel_buffers)
+            return problem(
+                Rule::layout_texel_buffer, ErrorCode::unsupported, binding,
+                fmt::format("expected no texel buffer on a device without texel_buffers, found a {}",
+                            name_of(binding.type)),
+                "Ask Capabilities::texel_buffers first; read a storage buffer or a texture instead.");
+    }
     const BindGroupLayoutDesc* one = &desc;
     return check_stage_limits(std::span(&one, 1), capabilities, "create bind group layout", "'" + desc.name + "'");
 }
@@ -462,6 +481,7 @@ Check check_stage_limits(std::span<const BindGroupLayoutDesc* const> layouts, co
                     case BindingType::uniform_buffer: counts[0] += binding.count; break;
                     case BindingType::storage_buffer:
                     case BindingType::readonly_storage_buffer: counts[1] += binding.count; break;
+                    case BindingType::uniform_texel_buffer:
                     case BindingType::sampled_texture: counts[2] += binding.count; break;
                     case BindingType::sampler: counts[3] += binding.count; break;
                     case BindingType::combined_texture_sampler:
@@ -470,7 +490,10 @@ Check check_stage_limits(std::span<const BindGroupLayoutDesc* const> layouts, co
                         break;
                     case BindingType::storage_image:
                     case BindingType::readonly_storage_image:
-                    case BindingType::writeonly_storage_image: counts[4] += binding.count; break;
+                    case BindingType::writeonly_storage_image:
+                    case BindingType::storage_texel_buffer:
+                    case BindingType::readonly_storage_texel_buffer:
+                    case BindingType::writeonly_storage_texel_buffer: counts[4] += binding.count; break;
                     case BindingType::acceleration_structure: break;
                 }
             }
@@ -525,6 +548,8 @@ Check check_shader(const ShaderReflection& reflection, const std::string& name, 
             return lacks("per-sample shading", "sample_rate_shading");
         if ((used == "ImageCubeArray" || used == "SampledCubeArray") && !capabilities.cube_arrays)
             return lacks("cube arrays", "cube_arrays");
+        if ((used == "SampledBuffer" || used == "ImageBuffer") && !capabilities.texel_buffers)
+            return lacks("texel buffers", "texel_buffers");
         if (used == "StorageImageWriteWithoutFormat" && !capabilities.fill_storage_without_format)
             return lacks("writes to images without a format", "fill_storage_without_format");
         if ((used == "RuntimeDescriptorArray" || used == "ShaderNonUniform") && !capabilities.descriptor_indexing)
@@ -533,22 +558,16 @@ Check check_shader(const ShaderReflection& reflection, const std::string& name, 
     const bool vertex = reflection.stage == ShaderStage::vertex;
     if ((vertex && !capabilities.storage_in_vertex) ||
         (reflection.stage == ShaderStage::fragment && !capabilities.storage_in_fragment))
-        for (const ReflectedBinding& binding : reflection.bindings) switch (binding.type) {
-                case BindingType::storage_buffer:
-                case BindingType::readonly_storage_buffer:
-                case BindingType::storage_image:
-                case BindingType::readonly_storage_image:
-                case BindingType::writeonly_storage_image:
-                    return problem(
-                        Rule::shader_storage_stage,
-                        fmt::format("expected no storage buffers or images in the {} stage on a device without "
-                                    "{}, found {} '{}' at set {}, binding {}",
-                                    vertex ? "vertex" : "fragment",
-                                    vertex ? "storage_in_vertex" : "storage_in_fragment", name_of(binding.type),
-                                    binding.name, binding.set, binding.binding),
-                        "Read through textures or uniform buffers, and write in a compute pass.");
-                default: break;
-            }
+        for (const ReflectedBinding& binding : reflection.bindings)
+            if (is_storage_buffer(binding.type) || is_storage_image(binding.type) ||
+                is_storage_texel_buffer(binding.type))
+                return problem(
+                    Rule::shader_storage_stage,
+                    fmt::format("expected no storage buffers or images in the {} stage on a device without "
+                                "{}, found {} '{}' at set {}, binding {}",
+                                vertex ? "vertex" : "fragment", vertex ? "storage_in_vertex" : "storage_in_fragment",
+                                name_of(binding.type), binding.name, binding.set, binding.binding),
+                    "Read through textures or uniform buffers, and write in a compute pass.");
     if (reflection.push_constant_bytes > capabilities.max_push_constant_bytes)
         return problem(Rule::push_constant_limit,
                        fmt::format("expected at most {} bytes of push constants (max_push_constant_bytes), found {}",

@@ -111,6 +111,7 @@ struct BufferUse {
     std::uint32_t binding = 0;
     ResourceState state{};
     std::uint64_t offset = 0, size = 0;
+    Format format = Format::undefined;  ///< Of the elements of a texel buffer.
 };
 struct TextureUse {
     SlotTable<Texture, TextureObject>::Slot* slot = nullptr;

@@ -7,6 +7,7 @@
 #include <array>
 #include <bit>
 
+#include "rhi/binding_type.h"
 #include "rhi/state_tracker.h"
 
 namespace nacre::rhi {
@@ -29,24 +30,9 @@ FormatKind shader_kind(FormatKind kind) {
     return kind == FormatKind::uint || kind == FormatKind::sint ? kind : FormatKind::floating;
 }
 
-bool is_storage_buffer(BindingType type) {
-    return type == BindingType::storage_buffer || type == BindingType::readonly_storage_buffer;
-}
-bool is_storage_image(BindingType type) {
-    return type == BindingType::storage_image || type == BindingType::readonly_storage_image ||
-           type == BindingType::writeonly_storage_image;
-}
-bool same_family(BindingType a, BindingType b) {
-    return a == b || (is_storage_buffer(a) && is_storage_buffer(b)) || (is_storage_image(a) && is_storage_image(b));
-}
-BindingType union_of(BindingType a, BindingType b) {
-    if (a == b) return a;
-    return is_storage_buffer(a) ? BindingType::storage_buffer : BindingType::storage_image;
-}
 /// Whether a binding of type `layout` allows what a shader that declares `declared` does.
 bool allows(BindingType layout, BindingType declared) {
-    return layout == declared || (layout == BindingType::storage_buffer && is_storage_buffer(declared)) ||
-           (layout == BindingType::storage_image && is_storage_image(declared));
+    return is_same_resource(layout, declared) && union_of(layout, declared) == layout;
 }
 
 bool uses_source1(BlendFactor factor) { return factor >= BlendFactor::source1_color; }
@@ -295,7 +281,7 @@ Check merge_stages(std::span<const BackendShader* const> shaders, const std::str
                 continue;
             }
             ReflectedBinding& known = at->declared;
-            if (!same_family(known.type, binding.type) || known.count != binding.count)
+            if (!is_same_resource(known.type, binding.type) || known.count != binding.count)
                 return Problem{
                     Rule::pipeline_binding_conflict,
                     ErrorCode::invalid_argument,

@@ -12,6 +12,7 @@
 #define SPV_ENABLE_UTILITY_CODE  // For HasResultAndType.
 #include <spirv/unified1/spirv.hpp11>
 
+#include "rhi/binding_type.h"
 #include "rhi/spirv.h"
 
 namespace nacre::rhi {
@@ -107,14 +108,6 @@ ViewDimension dimension_of(spv::Dim dim, bool arrayed) {
         case spv::Dim::Cube: return arrayed ? ViewDimension::cube_array : ViewDimension::cube;
         default: return ViewDimension::automatic;
     }
-}
-
-bool is_storage(BindingType type) {
-    return type == BindingType::storage_image || type == BindingType::readonly_storage_image ||
-           type == BindingType::writeonly_storage_image;
-}
-bool is_storage_buffer(BindingType type) {
-    return type == BindingType::storage_buffer || type == BindingType::readonly_storage_buffer;
 }
 
 /// A module that the validator has passed, indexed by id. Every look-up is still checked: the validator's rules
@@ -485,20 +478,27 @@ class Reflector {
         binding.depth_comparison = image->operand(3) == 1;
         binding.dimension = dimension_of(dim, image->operand(4) != 0);
         binding.multisampled = image->operand(5) != 0;
-        if (binding.dimension == ViewDimension::automatic)
+        const bool is_texel_buffer = dim == spv::Dim::Buffer;
+        if (binding.dimension == ViewDimension::automatic && !is_texel_buffer)
             return reject(ErrorCode::unsupported,
-                          fmt::format("'{}' is a {}", binding.name,
-                                      dim == spv::Dim::Buffer ? "texel buffer" : "kind of image that cannot be bound"),
-                          dim == spv::Dim::Buffer ? "Use a storage buffer or a texture." : "Use a 1D, 2D, 3D or cube image.");
-        if (is_combined) {
-            binding.type = BindingType::combined_texture_sampler;
-        } else if (image->operand(6) == 2) {
-            binding.type = module_.has(variable, spv::Decoration::NonWritable)   ? BindingType::readonly_storage_image
-                           : module_.has(variable, spv::Decoration::NonReadable) ? BindingType::writeonly_storage_image
-                                                                                 : BindingType::storage_image;
+                          fmt::format("'{}' is a kind of image that cannot be bound", binding.name),
+                          "Use a 1D, 2D, 3D or cube image, or a texel buffer.");
+        if (image->operand(6) == 2) {
+            const bool is_readonly = module_.has(variable, spv::Decoration::NonWritable);
+            const bool is_writeonly = !is_readonly && module_.has(variable, spv::Decoration::NonReadable);
+            if (is_texel_buffer)
+                binding.type = is_readonly    ? BindingType::readonly_storage_texel_buffer
+                               : is_writeonly ? BindingType::writeonly_storage_texel_buffer
+                                              : BindingType::storage_texel_buffer;
+            else
+                binding.type = is_readonly    ? BindingType::readonly_storage_image
+                               : is_writeonly ? BindingType::writeonly_storage_image
+                                              : BindingType::storage_image;
             binding.image_format = format_of(static_cast<spv::ImageFormat>(image->operand(7)));
+        } else if (is_texel_buffer) {
+            binding.type = BindingType::uniform_texel_buffer;
         } else {
-            binding.type = BindingType::sampled_texture;
+            binding.type = is_combined ? BindingType::combined_texture_sampler : BindingType::sampled_texture;
         }
         return {};
     }
@@ -512,17 +512,13 @@ class Reflector {
             result_.bindings.push_back(std::move(binding));
             return {};
         }
-        const bool same_kind = shared->type == binding.type ||
-                               (is_storage(shared->type) && is_storage(binding.type)) ||
-                               (is_storage_buffer(shared->type) && is_storage_buffer(binding.type));
-        if (!same_kind || shared->count != binding.count || shared->dimension != binding.dimension ||
-            shared->multisampled != binding.multisampled)
+        if (!is_same_resource(shared->type, binding.type) || shared->count != binding.count ||
+            shared->dimension != binding.dimension || shared->multisampled != binding.multisampled)
             return reject(ErrorCode::shader_compile,
                           fmt::format("'{}' and '{}' share set {}, binding {}, but are of different kinds", shared->name,
                                       binding.name, binding.set, binding.binding),
                           "Give one of them another binding number.");
-        if (shared->type != binding.type)
-            shared->type = is_storage(binding.type) ? BindingType::storage_image : BindingType::storage_buffer;
+        shared->type = union_of(shared->type, binding.type);
         shared->block_size = std::max(shared->block_size, binding.block_size);
         shared->used |= binding.used;
         return {};

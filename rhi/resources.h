@@ -30,6 +30,8 @@ struct Offset3D {
 enum class BufferUsage : std::uint32_t {
     none = 0, vertex = 1, index = 2, uniform = 4, storage = 8, indirect = 16, copy_source = 32, copy_destination = 64,
     acceleration_structure_input = 128,  ///< Vertices and indices that acceleration structures are built from.
+    uniform_texel = 256,                 ///< BindingType::uniform_texel_buffer; needs Capabilities::texel_buffers.
+    storage_texel = 512,                 ///< BindingType::*storage_texel_buffer; needs Capabilities::texel_buffers.
 };
 NACRE_FLAGS(BufferUsage)
 
@@ -138,6 +140,11 @@ enum class BindingType : std::uint8_t {
     readonly_storage_image,
     writeonly_storage_image,
     acceleration_structure,    ///< accelerationStructureEXT; a top level.
+    /// samplerBuffer, textureBuffer and those of integers: elements of a format, read by texelFetch.
+    uniform_texel_buffer,
+    storage_texel_buffer,      ///< imageBuffer, iimageBuffer, uimageBuffer: read, written and changed by atomics.
+    readonly_storage_texel_buffer,
+    writeonly_storage_texel_buffer,
 };
 
 struct BindingLayout {
@@ -160,11 +167,15 @@ struct BindGroupEntry {
     std::uint32_t binding = 0;
     Buffer buffer{};
     std::uint64_t offset = 0;
-    std::uint64_t size = ~0ull;  ///< Bytes; default: to the end of the buffer.
+    /// Bytes; default: to the end of the buffer, of texel buffers to the last whole element in it.
+    std::uint64_t size = ~0ull;
     TextureView texture{};
     Sampler sampler{};
     AccelerationStructure acceleration_structure{};
     std::uint32_t element = 0;   ///< Index into an arrayed binding.
+    /// Texel buffers: what each element is. The shader sees the range's bytes as size / info(format).block_bytes
+    /// elements, the first at `offset`; reads behind them give zero in all channels, writes there vanish.
+    Format format = Format::undefined;
 };
 
 /// An immutable set of resources; cheap enough to be made every frame.

@@ -55,6 +55,8 @@
     X(304, layout_unbounded, "layout-unbounded",                                                                      \
       "An unbounded array is asked for where the device or the binding's type has none.")                             \
     X(305, layout_binding_limit, "layout-binding-limit", "A binding has a number above 4,095.")                       \
+    X(306, layout_texel_buffer, "layout-texel-buffer",                                                                \
+      "A layout holds a texel buffer and the device has none.")                                                       \
     X(310, group_unknown_binding, "group-unknown-binding", "A bind group has an entry for a binding that its layout lacks.") \
     X(311, group_duplicate_entry, "group-duplicate-entry", "A bind group has two entries for the same place.")        \
     X(312, group_missing_entry, "group-missing-entry", "A bind group has no entry for a binding of its layout.")      \
@@ -70,6 +72,10 @@
     X(321, group_storage_view, "group-storage-view", "A storage image views more than one mip, or several samples.")  \
     X(322, group_acceleration_structure_level, "group-acceleration-structure-level",                                  \
       "A bottom-level acceleration structure is bound to a shader.")                                                  \
+    X(323, group_texel_format, "group-texel-format",                                                                  \
+      "A texel buffer has no format, or one that the device cannot use in buffers in this way.")                      \
+    X(324, group_texel_range, "group-texel-range",                                                                    \
+      "The range of a texel buffer holds no element, or ends inside of one.")                                         \
     X(401, shader_stage, "shader-stage", "A shader has no stage or several.")                                         \
     X(402, shader_capability, "shader-capability", "A shader needs a feature that the device lacks.")                 \
     X(403, shader_storage_stage, "shader-storage-stage",                                                              \
@@ -133,7 +139,8 @@
     X(540, viewport, "viewport", "A viewport is not finite, has no size, or has depths outside of 0 to 1.")           \
     X(541, scissor, "scissor", "A scissor rectangle reaches beyond the targets of the pass.")                         \
     X(545, dispatch_limit, "dispatch-limit", "A dispatch has more workgroups than the device allows.")                \
-    X(546, binding_view, "binding-view", "A texture in a bind group does not have the dimension or kind that the shader reads.") \
+    X(546, binding_view, "binding-view", \
+      "A texture or texel buffer in a bind group does not have the dimension, format or kind that the shader reads.") \
     X(547, binding_size, "binding-size", "A buffer in a bind group is smaller than the block that the shader declares.") \
     X(550, copy_range, "copy-range", "A copy, fill or clear reaches beyond a resource.")                              \
     X(551, copy_usage, "copy-usage", "A resource of a copy, fill or clear lacks the usage for it.")                   \

@@ -10,6 +10,7 @@
 #include "backends/cpu/buffer.h"
 #include "backends/cpu/sampler.h"
 #include "backends/cpu/texture.h"
+#include "rhi/binding_type.h"
 
 namespace nacre::cpu {
 
@@ -71,7 +72,12 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> CpuBindGroup::create(rhi::Backe
                 group->checked.resize(count);
                 group->checked[slots->first + binding.element] = checked.get();
             };
-            if (const auto* buffer = static_cast<const CpuBuffer*>(binding.buffer)) {
+            const auto* buffer = static_cast<const CpuBuffer*>(binding.buffer);
+            if (buffer && rhi::is_texel_buffer(binding.type)) {
+                group->texel_views.push_back(std::make_unique<const ImageView>(texel_view(*buffer, binding)));
+                descriptor.image = group->texel_views.back().get();
+                note(buffer->checked);
+            } else if (buffer) {
                 descriptor.data = buffer->data() + binding.offset;
                 descriptor.size = std::min(binding.size, buffer->size_from(binding.offset));
                 if (buffer->shadow()) descriptor.shadow = buffer->shadow() + 2 * binding.offset;

@@ -7,6 +7,7 @@
 
 #include "backends/cpu/checks/checked_memory.h"
 #include "backends/cpu/compiler/compiler.h"
+#include "backends/cpu/image_view.h"
 #include "backends/cpu/shader_interface.h"
 #include "rhi/backend.h"
 
@@ -41,6 +42,7 @@ class CpuBindGroup : public rhi::BackendBindGroup {
   public:
     std::vector<Descriptor> descriptors;
     CheckedObjects checked;  ///< What lies behind each descriptor; empty on devices without checks.
+    std::vector<std::unique_ptr<const ImageView>> texel_views;  ///< Of the texel buffers among the descriptors.
 
     static Expected<std::unique_ptr<rhi::BackendBindGroup>> create(rhi::BackendBindGroupLayout& layout,
                                                                    std::span<const rhi::BackendBinding> bindings,

@@ -29,12 +29,13 @@ FormatSupport format_support(Format format) {
     if (facts.is_compressed()) return support | filtered;
     if (facts.is_depth_stencil()) return support | filtered | depth_target | multisampled;
     if (!facts.is_integer()) support |= filtered;
-    if (has_image_atomics(format)) support |= storage_atomic;
+    if (has_image_atomics(format)) support |= storage_atomic | storage_texel_buffer_atomic;
+    if (facts.kind != rhi::FormatKind::srgb) support |= uniform_texel_buffer;
     // A shared exponent leaves no channel that could be masked or blended by itself.
     if (format == Format::rgb9e5_float) return support;
     support |= color_target | multisampled;
     if (!facts.is_integer()) support |= blended;
-    if (facts.kind != rhi::FormatKind::srgb) support |= storage_image;
+    if (facts.kind != rhi::FormatKind::srgb) support |= storage_image | storage_texel_buffer;
     return support;
 }
 
@@ -59,6 +60,7 @@ rhi::Capabilities find_capabilities(std::uint32_t subgroup_size) {
     result.ray_query = true;
     result.texture_views = result.texture_view_formats = true;
     result.fill_storage_without_format = true;
+    result.texel_buffers = true;
 
     result.max_texture_1d = result.max_texture_2d = result.max_texture_cube = 16384;
     result.max_texture_3d = 2048;
@@ -73,7 +75,9 @@ rhi::Capabilities find_capabilities(std::uint32_t subgroup_size) {
     result.max_uniform_buffer_range = result.max_storage_buffer_range = largest_range;
     result.device_memory_bytes = machine_memory_bytes();
     result.max_buffer_size = result.device_memory_bytes;
-    result.uniform_offset_alignment = result.storage_offset_alignment = 16;
+    result.uniform_offset_alignment = result.storage_offset_alignment = result.texel_buffer_offset_alignment = 16;
+    // What GPUs have. The largest elements reach 2 GiB then, which rows of images can be long.
+    result.max_texel_buffer_elements = 1u << 27;
     result.max_vertex_attributes = result.max_vertex_buffers = 32;
     result.max_vertex_stride = 65536;
     constexpr std::uint32_t many = 1024;

@@ -87,6 +87,8 @@ const CommandChecks* Executor::make_checks(const char* what, std::uint32_t numbe
         checks.command += fmt::format(", '{}'", debug_groups_.back());
     for (std::size_t i = 0; i < groups_.size(); ++i)
         if (groups_[i]) checks.objects[i] = &groups_[i]->checked;
+    for (std::size_t i = 0; i < vertex_buffers_.size(); ++i)
+        if (vertex_buffers_[i].buffer) checks.vertex_buffers[i] = vertex_buffers_[i].buffer->checked.get();
     checks.workgroup_memories = workgroup_check_pointers_;
     checks.batches = &batches_;
     checks.state = &watchdog_.state();

@@ -128,7 +128,7 @@ class Executor {
         const CpuBuffer* buffer = nullptr;
         std::uint64_t offset = 0;
     };
-    std::array<VertexBuffer, 32> vertex_buffers_{};
+    std::array<VertexBuffer, max_vertex_buffers> vertex_buffers_{};
     const CpuBuffer* index_buffer_ = nullptr;
     std::uint64_t index_offset_ = 0;
     rhi::IndexType index_type_ = rhi::IndexType::uint16;

@@ -8,13 +8,14 @@
 #include "rhi/resources.h"
 
 /// @file
-/// Textures as shaders and the rasterizer see them: where the texels are, and how to read them.
+/// Textures and texel buffers as shaders and the rasterizer see them: where the texels are, and how to read them.
 ///
 /// Texels lie in rows without padding between texels: texel (x, y, z) of sample s, layer l and mip m is at
 ///     levels[m].data + l * levels[m].layer_stride + s * levels[m].sample_stride + z * levels[m].slice_stride
 ///                    + y * levels[m].row_stride + x * block_bytes
 /// Block-compressed formats lie there as blocks (x and y counted in blocks). Depth-stencil formats lie as two planes: depth
 /// (d24 as 32 bits with the value in the low 24, d16 as 16, d32 as float) in the levels, stencil (8 bits) in `stencil_levels`.
+/// Texel buffers are views of dimension d1 with one mip.
 
 namespace nacre::cpu {
 
@@ -25,8 +26,8 @@ struct ImageLevel {
     std::uint32_t width = 0, height = 0, depth = 0;  ///< Texels.
     std::uint32_t row_stride = 0;                    ///< Bytes.
     std::uint64_t slice_stride = 0, layer_stride = 0, sample_stride = 0;
-    /// Of devices in double precision, else null: four doubles for each texel, those of the texel at data + n *
-    /// texel_bytes at shadow + 4 * n. See images/double_texels.h.
+    /// Of devices in double precision, else null: doubles for each texel, those of the texel at data + n * texel_bytes
+    /// at shadow + n * ImageView::shadow_doubles. See images/double_texels.h.
     double* shadow = nullptr;
 };
 
@@ -50,6 +51,7 @@ struct ImageView {
     DirectTexels direct_texels = DirectTexels::no;
     std::array<ImageLevel, max_mips> levels{};
     std::array<ImageLevel, max_mips> stencil_levels{};
+    std::uint32_t shadow_doubles = 4;  ///< For each texel: 4 in textures, in texel buffers one for each word.
 };
 
 /// A sampler, prepared.

@@ -32,7 +32,7 @@ inline constexpr std::uint32_t most_workgroup_bytes = 65536;  ///< Of the variab
 struct Descriptor {
     std::byte* data;              ///< Buffers: first byte of the bound range, aligned to 16.
     std::uint64_t size;           ///< Buffers: bytes of the bound range.
-    const ImageView* image;       ///< Textures and images.
+    const ImageView* image;       ///< Textures, images and texel buffers.
     union {
         const SamplerState* sampler;  ///< Samplers and combined texture samplers.
         /// Buffers of devices in double precision: the double of each 32-bit word of the range, at twice the word's
@@ -80,9 +80,11 @@ struct VertexBufferBinding {
     const std::byte* shadow;  ///< As Descriptor::shadow; null where the device is not in double precision.
 };
 
+inline constexpr std::uint32_t max_vertex_buffers = 32;
+
 /// What is the same for all vertices of a draw.
 struct VertexDraw {
-    VertexBufferBinding buffers[32];
+    VertexBufferBinding buffers[max_vertex_buffers];
     std::int32_t base_vertex;      ///< gl_BaseVertex
     std::uint32_t base_instance;   ///< gl_BaseInstance
     std::uint32_t draw_index;      ///< gl_DrawID

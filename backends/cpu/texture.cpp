@@ -11,7 +11,8 @@
 namespace nacre::cpu {
 namespace {
 
-DirectTexels direct_texels(rhi::Format format) {
+DirectTexels direct_texels(rhi::Format format, std::uint64_t bytes) {
+    if (bytes >= std::uint64_t{1} << 31) return DirectTexels::no;
     switch (format) {
         case rhi::Format::r32_float:
         case rhi::Format::d32_float:
@@ -137,7 +138,27 @@ ImageView CpuTexture::make_view(const rhi::ViewReference& reference) const {
     const ImageLevel& first = view.levels[0];
     const std::uint64_t bytes = first.layer_stride * view.layer_count + first.slice_stride * first.depth +
                                 std::uint64_t{first.row_stride} * first.height;
-    if (view.samples == 1 && bytes < (std::uint64_t{1} << 31)) view.direct_texels = direct_texels(view.format);
+    if (view.samples == 1) view.direct_texels = direct_texels(view.format, bytes);
+    return view;
+}
+
+ImageView texel_view(const CpuBuffer& buffer, const rhi::BackendBinding& binding) {
+    const std::uint64_t bytes = std::min(binding.size, buffer.size_from(binding.offset));
+    ImageView view;
+    view.format = binding.format;
+    view.dimension = rhi::ViewDimension::d1;
+    view.mip_count = view.layer_count = 1;
+    view.texel_bytes = stored_texel_bytes(binding.format);
+    view.direct_texels = direct_texels(binding.format, bytes);
+    ImageLevel& level = view.levels[0];
+    level.data = buffer.data() + binding.offset;
+    level.width = static_cast<std::uint32_t>(bytes / view.texel_bytes);
+    level.height = level.depth = 1;
+    level.row_stride = level.width * view.texel_bytes;
+    level.slice_stride = level.layer_stride = level.sample_stride = level.row_stride;
+    view.shadow_doubles = float_words(binding.format);
+    if (buffer.shadow() && view.shadow_doubles != 0)
+        level.shadow = reinterpret_cast<double*>(buffer.shadow() + 2 * binding.offset);
     return view;
 }
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 
+#include "backends/cpu/buffer.h"
 #include "backends/cpu/checks/checked_memory.h"
 #include "backends/cpu/host_memory.h"
 #include "backends/cpu/image_view.h"
@@ -45,6 +46,9 @@ class CpuTexture : public rhi::BackendTexture {
     ImageView whole_{};
     std::map<ViewKey, std::unique_ptr<ImageView>> views_;
 };
+
+/// The range of a texel buffer as an image.
+ImageView texel_view(const CpuBuffer& buffer, const rhi::BackendBinding& binding);
 
 /// The texture behind a resolved reference.
 inline CpuTexture& texture_of(const rhi::TextureReference& reference) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "backends/cpu/images/double_texels.h"
 #include "backends/cpu/parallel_parts.h"
 
 namespace nacre::cpu {
@@ -23,15 +24,6 @@ BoxRows rows_of(const ImageLevel& level, std::uint32_t layer, const rhi::Offset3
                 std::uint64_t{offset.y / block_width} * level.row_stride +
                 std::uint64_t{offset.x / block_width} * texel_bytes,
             level.row_stride, level.slice_stride};
-}
-
-/// Channels of formats whose texels are floats of 32 bits and nothing else, so that their doubles can be copied to and
-/// from the words of buffers; 0 of other formats.
-std::uint32_t float_words(rhi::Format format) {
-    const rhi::FormatInfo& facts = rhi::info(format);
-    const bool is_words =
-        facts.kind == rhi::FormatKind::floating && !facts.is_compressed() && facts.block_bytes == 4 * facts.channels;
-    return is_words ? facts.channels : 0;
 }
 
 /// The doubles of the texel at an address in a level; null where the level has none.

@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <vector>
+
+#include "rhi/binding_type.h"
 
 namespace nacre::gl {
 
@@ -21,10 +24,11 @@ std::int32_t GlBindGroupLayout::position(const rhi::BindGroupLayoutDesc& desc, s
     return -1;
 }
 
-Expected<std::unique_ptr<rhi::BackendBindGroup>> GlBindGroup::create(rhi::BackendBindGroupLayout& layout,
+Expected<std::unique_ptr<rhi::BackendBindGroup>> GlBindGroup::create(const DriverPointer& driver,
+                                                                     rhi::BackendBindGroupLayout& layout,
                                                                      std::span<const rhi::BackendBinding> bindings,
                                                                      const std::string& name) {
-    auto group = std::make_unique<GlBindGroup>();
+    auto group = std::make_unique<GlBindGroup>(driver);
     group->layout = &layout;
     std::uint32_t total = 0;
     for (const rhi::BindingLayout& binding : layout.desc.bindings) total += binding.count;
@@ -37,17 +41,12 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> GlBindGroup::create(rhi::Backen
         entry.buffer = static_cast<GlBuffer*>(binding.buffer);
         entry.offset = binding.offset;
         entry.size = binding.size;
+        entry.format = binding.format;
         entry.sampler = static_cast<GlSampler*>(binding.sampler);
-        const bool has_texture = binding.type == rhi::BindingType::sampled_texture ||
-                                 binding.type == rhi::BindingType::combined_texture_sampler ||
-                                 binding.type == rhi::BindingType::storage_image ||
-                                 binding.type == rhi::BindingType::readonly_storage_image ||
-                                 binding.type == rhi::BindingType::writeonly_storage_image;
-        if (!has_texture) continue;
+        if (!rhi::has_texture(binding.type)) continue;
         entry.texture = static_cast<GlTexture*>(binding.view.texture.object);
         entry.view = binding.view;
-        const bool sampled = binding.type == rhi::BindingType::sampled_texture ||
-                             binding.type == rhi::BindingType::combined_texture_sampler;
+        const bool sampled = rhi::is_sampled(binding.type);
         if (sampled && entry.texture && !entry.texture->can_view(binding.view))
             return fail(ErrorCode::unsupported, "create bind group",
                         fmt::format("'{}', binding {}, texture '{}'", name, binding.binding, entry.texture->desc.name),
@@ -67,6 +66,36 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> GlBindGroup::create(rhi::Backen
                                 "Bind one range, and choose the mip in the shader.");
     }
     return group;
+}
+
+GlTexture::Name GlBindGroup::texels(Entry& entry) {
+    if (entry.shown.name != 0) return entry.shown;
+    const Functions& gl = driver_->gl;
+    entry.shown.target = GL_TEXTURE_BUFFER;
+    entry.shown.id = driver_->next_id();
+    gl.GenTextures(1, &entry.shown.name);
+    driver_->bind_scratch_texture(GL_TEXTURE_BUFFER, entry.shown.name);
+    const GLenum error = driver_->error_of([&] {
+        gl.TexBufferRange(GL_TEXTURE_BUFFER, gl_format(entry.format).internal, entry.buffer->name,
+                          static_cast<GLintptr>(entry.offset), static_cast<GLsizeiptr>(entry.size));
+    });
+    if (error != GL_NO_ERROR)
+        driver_->warn(rhi::MessageSeverity::error, "texel-buffer",
+                      fmt::format("buffer '{}': the driver refuses {} bytes from offset {} as elements of {} (error "
+                                  "0x{:04x})",
+                                  entry.buffer->desc.name, entry.size, entry.offset, rhi::info(entry.format).name,
+                                  error));
+    return entry.shown;
+}
+
+GlBindGroup::~GlBindGroup() {
+    std::vector<GLuint> names;
+    for (const Entry& entry : entries)
+        if (entry.format != rhi::Format::undefined && entry.shown.name != 0) names.push_back(entry.shown.name);
+    if (names.empty()) return;
+    driver_->worker->post([driver = driver_.get(), deleted = std::move(names)] {
+        driver->gl.DeleteTextures(static_cast<GLsizei>(deleted.size()), deleted.data());
+    });
 }
 
 }  // namespace nacre::gl

@@ -22,20 +22,33 @@ class GlBindGroupLayout : public rhi::BackendBindGroupLayout {
 
 class GlBindGroup : public rhi::BackendBindGroup {
   public:
+    explicit GlBindGroup(DriverPointer driver) : driver_(std::move(driver)) {}
+    ~GlBindGroup() override;
+
     struct Entry {
         GlBuffer* buffer = nullptr;
         std::uint64_t offset = 0, size = 0;
+        rhi::Format format = rhi::Format::undefined;  ///< Of the elements of a texel buffer; else undefined.
         GlTexture* texture = nullptr;
         rhi::ViewReference view{};
         GlSampler* sampler = nullptr;
-        GlTexture::Name shown{};  ///< Of `view`, once it was bound; worker thread only.
+        /// Of `view` or of the texel buffer, once it was bound; worker thread only.
+        GlTexture::Name shown{};
     };
     std::vector<Entry> entries;
 
     /// Errors: unsupported for a view that this OpenGL cannot show.
-    static Expected<std::unique_ptr<rhi::BackendBindGroup>> create(rhi::BackendBindGroupLayout& layout,
+    static Expected<std::unique_ptr<rhi::BackendBindGroup>> create(const DriverPointer& driver,
+                                                                   rhi::BackendBindGroupLayout& layout,
                                                                    std::span<const rhi::BackendBinding> bindings,
                                                                    const std::string& name);
+
+    /// The texture object that shows the range of a texel buffer; made when first asked for, and kept with the group.
+    /// Worker thread only.
+    GlTexture::Name texels(Entry& entry);
+
+  private:
+    DriverPointer driver_;
 };
 
 }  // namespace nacre::gl

@@ -84,6 +84,7 @@ rhi::Capabilities find_capabilities(const Functions& gl, const Traits& traits) {
     result.texture_view_formats = traits.texture_view;
     result.fill_storage_without_format = traits.desktop;
     result.sampler_mip_bias = traits.desktop;
+    result.texel_buffers = traits.buffer_textures;
 
     result.max_texture_2d = query.number(GL_MAX_TEXTURE_SIZE);
     result.max_texture_1d = result.max_texture_2d;
@@ -104,6 +105,10 @@ rhi::Capabilities find_capabilities(const Functions& gl, const Traits& traits) {
     result.max_buffer_size = std::uint64_t{1} << 31;
     result.uniform_offset_alignment = query.number(GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT);
     result.storage_offset_alignment = query.number(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT);
+    if (traits.buffer_textures) {
+        result.texel_buffer_offset_alignment = query.number(GL_TEXTURE_BUFFER_OFFSET_ALIGNMENT);
+        result.max_texel_buffer_elements = query.number(GL_MAX_TEXTURE_BUFFER_SIZE);
+    }
     result.max_vertex_attributes = query.number(GL_MAX_VERTEX_ATTRIBS);
     result.max_vertex_buffers = std::min(query.number(GL_MAX_VERTEX_ATTRIB_BINDINGS), 32u);
     result.max_vertex_stride = query.number(GL_MAX_VERTEX_ATTRIB_STRIDE);

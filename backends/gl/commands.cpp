@@ -23,8 +23,10 @@ GLbitfield barrier_bits(ResourceUse use, bool is_buffer) {
     add(ResourceUse::indirect_argument, GL_COMMAND_BARRIER_BIT);
     add(ResourceUse::uniform_buffer, GL_UNIFORM_BARRIER_BIT);
     add(ResourceUse::sampled, GL_TEXTURE_FETCH_BARRIER_BIT);
+    // Texel buffers are images of a buffer.
     add(ResourceUse::storage_read | ResourceUse::storage_write,
-        is_buffer ? GL_SHADER_STORAGE_BARRIER_BIT : GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
+        is_buffer ? GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT
+                  : GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
     add(ResourceUse::color_target | ResourceUse::depth_stencil_read | ResourceUse::depth_stencil_write |
             ResourceUse::resolve_source | ResourceUse::resolve_destination,
         GL_FRAMEBUFFER_BARRIER_BIT);

@@ -54,6 +54,8 @@ class Executor {
     void bind_slot(const Program::Slot& slot);
     void bind_texture(const Program::TextureSlot& slot);
     void bind_image(const SlotRange& range, std::uint32_t unit, GlBindGroup::Entry& entry);
+    void bind_texel_image(const SlotRange& range, std::uint32_t unit, GlBindGroup& group, GlBindGroup::Entry& entry);
+    void bind_image_unit(std::uint32_t unit, GLuint name, const BoundState::Image& wanted);
     void push_constants(Program& program);
     void bind_vertex_buffers();
     void bind_index_buffer();

@@ -162,7 +162,7 @@ Expected<std::unique_ptr<rhi::BackendBindGroupLayout>> GlDevice::create_bind_gro
 Expected<std::unique_ptr<rhi::BackendBindGroup>> GlDevice::create_bind_group(
     rhi::BackendBindGroupLayout& layout, std::span<const rhi::BackendBinding> bindings, const std::string& name) {
     NACRE_CHECK(check_lost("create bind group"));
-    return GlBindGroup::create(layout, bindings, name);
+    return GlBindGroup::create(driver_, layout, bindings, name);
 }
 
 Expected<std::unique_ptr<rhi::BackendGraphicsPipeline>> GlDevice::create_graphics_pipeline(

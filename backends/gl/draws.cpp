@@ -10,6 +10,9 @@ namespace {
 GLenum index_name(rhi::IndexType type) { return type == rhi::IndexType::uint16 ? GL_UNSIGNED_SHORT : GL_UNSIGNED_INT; }
 std::uint64_t index_bytes(rhi::IndexType type) { return type == rhi::IndexType::uint16 ? 2 : 4; }
 const void* as_pointer(std::uint64_t offset) { return reinterpret_cast<const void*>(offset); }
+GLenum image_access(const SlotRange& range) {
+    return !range.readable ? GL_WRITE_ONLY : !range.writable ? GL_READ_ONLY : GL_READ_WRITE;
+}
 
 }  // namespace
 
@@ -85,6 +88,7 @@ void Executor::bind_slot(const Program::Slot& slot) {
         const std::uint32_t point = slot.range.first + element;
         if (slot.range.kind == SlotRange::Kind::image) {
             if (entry.texture) bind_image(slot.range, point, entry);
+            if (entry.format != rhi::Format::undefined) bind_texel_image(slot.range, point, group, entry);
             continue;
         }
         if (!entry.buffer) continue;
@@ -99,13 +103,26 @@ void Executor::bind_slot(const Program::Slot& slot) {
     }
 }
 
+void Executor::bind_image_unit(std::uint32_t unit, GLuint name, const BoundState::Image& wanted) {
+    BoundState::Image& bound = driver_.bound.images[unit];
+    if (bound == wanted) return;
+    bound = wanted;
+    gl_.BindImageTexture(unit, name, static_cast<GLint>(wanted.level), wanted.layered ? GL_TRUE : GL_FALSE,
+                         static_cast<GLint>(wanted.layer), wanted.access, wanted.format);
+}
+
+void Executor::bind_texel_image(const SlotRange& range, std::uint32_t unit, GlBindGroup& group,
+                                GlBindGroup::Entry& entry) {
+    const GlTexture::Name texels = group.texels(entry);
+    bind_image_unit(unit, texels.name,
+                    {texels.id, 0, 0, false, image_access(range), gl_format(entry.format).internal});
+}
+
 void Executor::bind_image(const SlotRange& range, std::uint32_t unit, GlBindGroup::Entry& entry) {
     GlTexture& texture = *entry.texture;
     const rhi::ViewReference& view = entry.view;
     GLuint name = texture.name;
-    BoundState::Image wanted{texture.id, view.base_mip, 0, true, GL_READ_WRITE, gl_format(view.format).internal};
-    if (!range.writable) wanted.access = GL_READ_ONLY;
-    if (!range.readable) wanted.access = GL_WRITE_ONLY;
+    BoundState::Image wanted{texture.id, view.base_mip, 0, true, image_access(range), gl_format(view.format).internal};
     const GLenum target = view_target(view.dimension, false, driver_.traits);
     const bool all_layers =
         view.base_layer == 0 && (texture.target == GL_TEXTURE_3D || view.layer_count == texture.desc.layers);
@@ -121,11 +138,7 @@ void Executor::bind_image(const SlotRange& range, std::uint32_t unit, GlBindGrou
         wanted.id = entry.shown.id;
         wanted.level = 0;
     }
-    BoundState::Image& bound = driver_.bound.images[unit];
-    if (bound == wanted) return;
-    bound = wanted;
-    gl_.BindImageTexture(unit, name, static_cast<GLint>(wanted.level), wanted.layered ? GL_TRUE : GL_FALSE,
-                         static_cast<GLint>(wanted.layer), wanted.access, wanted.format);
+    bind_image_unit(unit, name, wanted);
 }
 
 void Executor::bind_texture(const Program::TextureSlot& slot) {
@@ -133,10 +146,14 @@ void Executor::bind_texture(const Program::TextureSlot& slot) {
     GlBindGroup& group = *groups_[slot.range.set];
     for (std::uint32_t element = 0; element < slot.range.count; ++element) {
         GlBindGroup::Entry& entry = group.entries[static_cast<std::size_t>(slot.entry) + element];
-        if (!entry.texture) continue;
+        const bool is_texel_buffer = entry.format != rhi::Format::undefined;
+        if (!entry.texture && !is_texel_buffer) continue;
         const std::uint32_t unit = slot.range.first + element;
+        if (is_texel_buffer)
+            group.texels(entry);
         // Parameters of the texture stand in for views where there are none, and must be set again each time.
-        if (entry.shown.name == 0 || !driver_.traits.texture_view) entry.shown = entry.texture->view(entry.view);
+        else if (entry.shown.name == 0 || !driver_.traits.texture_view)
+            entry.shown = entry.texture->view(entry.view);
         if (driver_.bound.textures[unit] != entry.shown.id) {
             driver_.select_unit(unit);
             gl_.BindTexture(entry.shown.target, entry.shown.name);

@@ -136,6 +136,25 @@ bool is_color_renderable(const Traits& traits, Format format) {
     return true;
 }
 
+/// Formats of buffer textures (OpenGL 4.5, table 8.16; OpenGL ES 3.2, table 8.18).
+bool is_buffer_format(const Traits& traits, Format format) {
+    const rhi::FormatInfo& facts = rhi::info(format);
+    if (facts.is_compressed() || facts.is_depth_stencil() || facts.kind == rhi::FormatKind::snorm ||
+        facts.kind == rhi::FormatKind::srgb || facts.block_bytes == 12)
+        return false;
+    switch (format) {
+        case Format::bgra8_unorm:
+        case Format::rgb10a2_unorm:
+        case Format::rgb10a2_uint:
+        case Format::rg11b10_float:
+        case Format::rgb9e5_float: return false;
+        case Format::r16_unorm:
+        case Format::rg16_unorm:
+        case Format::rgba16_unorm: return traits.desktop;
+        default: return true;
+    }
+}
+
 }  // namespace
 
 bool is_es_image_format(Format format) {
@@ -168,6 +187,11 @@ FormatSupport format_support(const Functions& gl, const Traits& traits, Format f
         support |= FormatSupport::storage_image;
         if (traits.image_atomics && (format == Format::r32_uint || format == Format::r32_sint))
             support |= FormatSupport::storage_atomic;
+    }
+    if (traits.buffer_textures && is_buffer_format(traits, format)) {
+        support |= FormatSupport::uniform_texel_buffer;
+        if (has_all(support, FormatSupport::storage_image)) support |= FormatSupport::storage_texel_buffer;
+        if (has_all(support, FormatSupport::storage_atomic)) support |= FormatSupport::storage_texel_buffer_atomic;
     }
     if (facts.is_depth_stencil() || is_color_renderable(traits, format)) {
         std::array<GLint, 16> counts{};

@@ -105,6 +105,7 @@ namespace nacre::gl {
     X(QueryCounter, QUERYCOUNTER, "glQueryCounterEXT")                                                             \
     X(SamplerParameterIiv, SAMPLERPARAMETERIIV, "glSamplerParameterIiv")                                           \
     X(SamplerParameterfv, SAMPLERPARAMETERFV, "glSamplerParameterfv")                                              \
+    X(TexBufferRange, TEXBUFFERRANGE, "glTexBufferRange")                                                          \
     X(TexStorage1D, TEXSTORAGE1D, "")                                                                              \
     X(TexStorage3DMultisample, TEXSTORAGE3DMULTISAMPLE, "glTexStorage3DMultisample")                               \
     X(TexSubImage1D, TEXSUBIMAGE1D, "")                                                                            \

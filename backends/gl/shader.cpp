@@ -233,8 +233,11 @@ class Translator {
         std::tie(range.set, range.binding) = place_of(resource.id);
         if (const ReflectedBinding* reflected = find(range.set, range.binding)) {
             range.count = reflected->count;
-            range.readable = reflected->type != rhi::BindingType::writeonly_storage_image;
-            range.writable = reflected->type != rhi::BindingType::readonly_storage_image;
+            using enum rhi::BindingType;
+            range.readable =
+                reflected->type != writeonly_storage_image && reflected->type != writeonly_storage_texel_buffer;
+            range.writable =
+                reflected->type != readonly_storage_image && reflected->type != readonly_storage_texel_buffer;
         }
         range.first = slots_.image(range.set, range.binding, range.count);
         spvc_compiler_set_name(compiler_, resource.id,
@@ -247,12 +250,26 @@ class Translator {
     Expected<void> place_combined(const spvc_reflected_resource& resource) {
         // The list of what the module declares holds the pairs made above as well.
         if (std::ranges::find(combined_, resource.id) != combined_.end()) return {};
+        return place_texture(resource, true);
+    }
+
+    // Of textures without a sampler only texel buffers are left: the others were combined above.
+    Expected<void> place_texel_buffer(const spvc_reflected_resource& resource) {
+        const auto [set, binding] = place_of(resource.id);
+        const ReflectedBinding* reflected = find(set, binding);
+        if (!reflected || reflected->type != rhi::BindingType::uniform_texel_buffer) return {};
+        return place_texture(resource, false);
+    }
+
+    Expected<void> place_texture(const spvc_reflected_resource& resource, bool has_sampler) {
         TextureRange range;
-        range.combined = true;
+        range.combined = has_sampler;
         std::tie(range.set, range.binding) = place_of(resource.id);
         if (const ReflectedBinding* reflected = find(range.set, range.binding)) range.count = reflected->count;
-        range.sampler_set = range.set;
-        range.sampler_binding = range.binding;
+        if (has_sampler) {
+            range.sampler_set = range.set;
+            range.sampler_binding = range.binding;
+        }
         range.first = slots_.texture(range.set, range.binding, range.sampler_set, range.sampler_binding, range.count);
         spvc_compiler_set_name(compiler_, resource.id,
                                fmt::format("texture_{}_{}_{}", letter_, range.set, range.binding).c_str());
@@ -276,6 +293,8 @@ class Translator {
                                       [&](const Resource& resource) { return place_image(resource); }));
         NACRE_CHECK(for_each_resource(resources, SPVC_RESOURCE_TYPE_SAMPLED_IMAGE,
                                       [&](const Resource& resource) { return place_combined(resource); }));
+        NACRE_CHECK(for_each_resource(resources, SPVC_RESOURCE_TYPE_SEPARATE_IMAGE,
+                                      [&](const Resource& resource) { return place_texel_buffer(resource); }));
         NACRE_CHECK(for_each_resource(resources, SPVC_RESOURCE_TYPE_PUSH_CONSTANT, [&](const Resource& resource) {
             const std::string name = fmt::format("push_{}", letter_);
             spvc_compiler_set_name(compiler_, resource.id, name.c_str());

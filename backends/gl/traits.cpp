@@ -77,6 +77,7 @@ Traits find_traits(const Functions& gl, bool es, bool minimum, std::string origi
     // Not GL_NV_image_formats in OpenGL ES: SPIRV-Cross refuses to write those formats there.
     traits.image_formats = desktop;
     traits.image_atomics = desktop || es32 || has("GL_OES_shader_image_atomic");
+    traits.buffer_textures = (desktop || es32) && gl.TexBufferRange;
     traits.snorm_targets = desktop || has("GL_EXT_render_snorm");
     traits.s3tc = has("GL_EXT_texture_compression_s3tc");
     traits.s3tc_srgb = traits.s3tc && (desktop ? has("GL_EXT_texture_sRGB") || traits.version >= 21

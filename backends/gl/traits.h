@@ -51,6 +51,7 @@ struct Traits {
     bool unorm16 = false;            ///< 16-bit unorm and snorm formats.
     bool image_formats = false;      ///< Storage images of all formats of OpenGL 4.5.
     bool image_atomics = false;
+    bool buffer_textures = false;    ///< Ranges of buffers as textures and images.
     bool snorm_targets = false;
     bool s3tc = false, s3tc_srgb = false, rgtc = false, bptc = false;
     bool program_binary = false;

@@ -9,6 +9,7 @@
 #include "backends/vulkan/result.h"
 #include "backends/vulkan/sampler.h"
 #include "backends/vulkan/texture.h"
+#include "rhi/binding_type.h"
 
 namespace nacre::vulkan {
 
@@ -137,7 +138,7 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> BindGroup::create(Context& cont
                                                                    rhi::BackendBindGroupLayout& layout,
                                                                    std::span<const rhi::BackendBinding> bindings,
                                                                    const std::string& name) {
-    std::unique_ptr<BindGroup> group(new BindGroup);
+    std::unique_ptr<BindGroup> group(new BindGroup(context));
     group->layout = &layout;
     group->sets_ = static_cast<BindGroupLayout&>(layout).sets;
     std::uint32_t unbounded_count = 0;
@@ -152,6 +153,7 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> BindGroup::create(Context& cont
     // Filled to their final size first: the writes hold addresses of their elements.
     std::vector<VkDescriptorBufferInfo> buffers(bindings.size());
     std::vector<VkDescriptorImageInfo> images(bindings.size());
+    std::vector<VkBufferView> texels(bindings.size());
     std::vector<VkWriteDescriptorSetAccelerationStructureKHR> structures(
         bindings.size(), {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET_ACCELERATION_STRUCTURE_KHR});
     std::vector<VkWriteDescriptorSet> writes(bindings.size(), {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET});
@@ -163,6 +165,11 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> BindGroup::create(Context& cont
         write.dstArrayElement = from.element;
         write.descriptorCount = 1;
         write.descriptorType = to_vulkan(from.type);
+        if (rhi::is_texel_buffer(from.type)) {
+            NACRE_TRY(texels[i], group->view_texels(from, name));
+            write.pTexelBufferView = &texels[i];
+            continue;
+        }
         if (from.buffer) {
             buffers[i] = {native(*from.buffer).handle, from.offset, from.size};
             write.pBufferInfo = &buffers[i];
@@ -191,7 +198,23 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> BindGroup::create(Context& cont
     return group;
 }
 
+Expected<VkBufferView> BindGroup::view_texels(const rhi::BackendBinding& binding, const std::string& name) {
+    VkBufferViewCreateInfo info{VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO};
+    info.buffer = native(*binding.buffer).handle;
+    info.format = to_vulkan(binding.format);
+    info.offset = binding.offset;
+    info.range = binding.size;
+    VkBufferView view = VK_NULL_HANDLE;
+    if (VkResult result = context_.vk.CreateBufferView(context_.device, &info, nullptr, &view); result != VK_SUCCESS)
+        return fail(context_.check(result), "create view of",
+                    "buffer " + in_quotes(binding.buffer->desc.name) + " for bind group " + in_quotes(name));
+    texel_views_.push_back(view);
+    context_.set_name(view, VK_OBJECT_TYPE_BUFFER_VIEW, binding.buffer->desc.name);
+    return view;
+}
+
 BindGroup::~BindGroup() {
+    for (VkBufferView view : texel_views_) context_.vk.DestroyBufferView(context_.device, view, nullptr);
     if (sets_) sets_->release(set_);
 }
 

@@ -63,7 +63,11 @@ class BindGroup final : public rhi::BackendBindGroup {
     VkDescriptorSet handle = VK_NULL_HANDLE;
 
   private:
-    BindGroup() = default;
+    explicit BindGroup(Context& context) : context_(context) {}
+    Expected<VkBufferView> view_texels(const rhi::BackendBinding& binding, const std::string& name);
+
+    Context& context_;
+    std::vector<VkBufferView> texel_views_;
     std::shared_ptr<DescriptorSets> sets_;
     DescriptorSets::Set set_;
 };

@@ -17,6 +17,8 @@ Expected<std::unique_ptr<rhi::BackendBuffer>> Buffer::create(Context& context, c
     if (has_any(desc.usage, rhi::BufferUsage::index)) info.usage |= VK_BUFFER_USAGE_INDEX_BUFFER_BIT;
     if (has_any(desc.usage, rhi::BufferUsage::uniform)) info.usage |= VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT;
     if (has_any(desc.usage, rhi::BufferUsage::storage)) info.usage |= VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+    if (has_any(desc.usage, rhi::BufferUsage::uniform_texel)) info.usage |= VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT;
+    if (has_any(desc.usage, rhi::BufferUsage::storage_texel)) info.usage |= VK_BUFFER_USAGE_STORAGE_TEXEL_BUFFER_BIT;
     if (has_any(desc.usage, rhi::BufferUsage::indirect)) info.usage |= VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT;
     if (has_any(desc.usage, rhi::BufferUsage::acceleration_structure_input))
         info.usage |= VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR |

@@ -27,6 +27,10 @@ rhi::FormatSupport support_of(const Instance& instance, const PhysicalDevice& de
     if (has & VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT) support |= storage_image;
     if (has & VK_FORMAT_FEATURE_STORAGE_IMAGE_ATOMIC_BIT) support |= storage_atomic;
     if (facts.bufferFeatures & VK_FORMAT_FEATURE_VERTEX_BUFFER_BIT) support |= vertex;
+    if (facts.bufferFeatures & VK_FORMAT_FEATURE_UNIFORM_TEXEL_BUFFER_BIT) support |= uniform_texel_buffer;
+    if (facts.bufferFeatures & VK_FORMAT_FEATURE_STORAGE_TEXEL_BUFFER_BIT) support |= storage_texel_buffer;
+    if (facts.bufferFeatures & VK_FORMAT_FEATURE_STORAGE_TEXEL_BUFFER_ATOMIC_BIT)
+        support |= storage_texel_buffer_atomic;
     const bool is_color_target = has & VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT;
     const bool is_depth_target = has & VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT;
     if (is_color_target || is_depth_target) {
@@ -201,6 +205,7 @@ rhi::Capabilities capabilities_of(const Instance& instance, const PhysicalDevice
     result.texture_view_formats = true;
     result.fill_storage_without_format = features.shaderStorageImageWriteWithoutFormat;
     result.sampler_mip_bias = true;
+    result.texel_buffers = true;
 
     result.max_texture_1d = limits.maxImageDimension1D;
     result.max_texture_2d = limits.maxImageDimension2D;
@@ -223,6 +228,8 @@ rhi::Capabilities capabilities_of(const Instance& instance, const PhysicalDevice
         result.max_buffer_size = std::min(result.max_buffer_size, device.maintenance4.maxBufferSize);
     result.uniform_offset_alignment = static_cast<std::uint32_t>(limits.minUniformBufferOffsetAlignment);
     result.storage_offset_alignment = static_cast<std::uint32_t>(limits.minStorageBufferOffsetAlignment);
+    result.texel_buffer_offset_alignment = static_cast<std::uint32_t>(limits.minTexelBufferOffsetAlignment);
+    result.max_texel_buffer_elements = limits.maxTexelBufferElements;
     result.max_vertex_attributes = limits.maxVertexInputAttributes;
     result.max_vertex_buffers = std::min(limits.maxVertexInputBindings, 16u);
     result.max_vertex_stride = limits.maxVertexInputBindingStride;

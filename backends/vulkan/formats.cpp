@@ -163,6 +163,10 @@ VkDescriptorType to_vulkan(rhi::BindingType type) {
         case storage_image:
         case readonly_storage_image:
         case writeonly_storage_image: return VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
+        case uniform_texel_buffer: return VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
+        case storage_texel_buffer:
+        case readonly_storage_texel_buffer:
+        case writeonly_storage_texel_buffer: return VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER;
         case acceleration_structure: return VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR;
     }
     return VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;

@@ -64,6 +64,8 @@ namespace nacre::vulkan {
     X(DestroyImage)                      \
     X(GetImageMemoryRequirements2)       \
     X(BindImageMemory)                   \
+    X(CreateBufferView)                  \
+    X(DestroyBufferView)                 \
     X(CreateImageView)                   \
     X(DestroyImageView)                  \
     X(CreateSampler)                     \

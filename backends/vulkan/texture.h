@@ -19,10 +19,11 @@ class Texture final : public rhi::BackendTexture {
     /// The view of a range; made once and kept as long as the texture.
     Expected<VkImageView> view(const rhi::ViewReference& range, ViewPurpose purpose);
 
-    /// The layout in which shaders sample this texture. That of depth textures lets a pass test against them too.
+    /// The layout in which shaders sample this texture. That of depth targets lets a pass test against them too;
+    /// textures that are no targets must not have it.
     [[nodiscard]] VkImageLayout sampled_layout() const {
-        return aspects & VK_IMAGE_ASPECT_DEPTH_BIT ? VK_IMAGE_LAYOUT_DEPTH_STENCIL_READ_ONLY_OPTIMAL
-                                                   : VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL;
+        return usage & VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT ? VK_IMAGE_LAYOUT_DEPTH_STENCIL_READ_ONLY_OPTIMAL
+                                                                   : VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL;
     }
 
     VkImage handle = VK_NULL_HANDLE;

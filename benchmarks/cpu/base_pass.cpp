@@ -11,6 +11,7 @@
 #include "materials/single_slab.h"
 #include "passes/camera_block.h"
 #include "passes/render_pass.h"
+#include "passes/scene_closures.h"
 #include "scene/builtin.h"
 
 /// @file
@@ -120,8 +121,8 @@ class Landscape {
     Expected<void> prepare(const scene::Scene& scene) {
         std::vector<materials::SingleSlab> slabs;
         for (const auto& material : scene.materials) slabs.push_back(materials::single_slab(material));
-        NACRE_TRY(geometry_, passes::SceneGeometry::create(device_, scene, slabs, 0, false));
-        NACRE_TRY(materials_, passes::SceneMaterials::create(device_, scene, slabs,
+        NACRE_TRY(geometry_, passes::SceneGeometry::create(device_, scene, slabs, closures_, 0, false));
+        NACRE_TRY(materials_, passes::SceneMaterials::create(device_, scene, slabs, closures_,
                                                              std::vector<bool>(slabs.size(), true), 0, 1.0f));
         shaders_ = std::make_unique<passes::ShaderLibrary>(device_, nullptr);
 
@@ -160,6 +161,7 @@ class Landscape {
                                       .shaders = *shaders_,
                                       .geometry = *geometry_,
                                       .materials = *materials_,
+                                      .closures = closures_,
                                       .profile = *profile,
                                       .decisions = decisions,
                                       .resources = resources,
@@ -198,6 +200,7 @@ class Landscape {
 
     rhi::Device& device_;
     const bool prepass_;
+    const passes::SceneClosures closures_;  ///< None: all materials are plain slabs.
     std::unique_ptr<passes::SceneGeometry> geometry_;
     std::unique_ptr<passes::SceneMaterials> materials_;
     std::unique_ptr<passes::ShaderLibrary> shaders_;

@@ -119,7 +119,7 @@ Slab layer_slabs(Slab top, Slab base, Matter top_matter, Matter base_matter) {
     // What crosses the top is tinted twice: towards the view, and from the light, which is taken to come along the
     // normal.
     vec3 through = top_matter.view_transmittance * top_matter.transmittance *
-                   bounce_factor(top_matter.internal, base_matter.albedo);
+                   bounces_between(top_matter, base_matter).leaving;
     BlendShares shares;
     shares.coverage = top.coverage + (1.0 - top.coverage) * base.coverage;
     shares.first = top.coverage;

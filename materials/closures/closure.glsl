@@ -33,8 +33,7 @@
 //     vec3 closure_transmittance(Closure closure, float cos_theta)    straight through the medium, by outer direction
 //     vec3 closure_throughput(Closure closure)                        of the view: through fuzz, interface and medium
 //     float slab_coverage(Slab slab, float cos_theta)                 where a slab may have slab_edge_coverage
-//     vec3 internal_reflectance(Slab slab)                            K, of diffuse light from the medium's side
-//     vec3 bounce_factor(vec3 internal, vec3 base_albedo)             (1 - K) / (1 - E_b K)
+//     vec3 internal_transmittance(Slab slab)                          of diffuse light from the medium's side
 //
 // Who includes this provides the tables (materials/closures/tables.glsl, medium.glsl) and, where a slab may have
 // slab_specular_lut, vec3 specular_lut(uint index, vec2 at): the tint by the cosines of view and light to the normal.
@@ -105,9 +104,10 @@ struct Closure {
 #ifdef NACRE_SLAB_SPECULAR_LUT
     uint specular_lut;
 #endif
-    float gloss;          // of the diffuse model
-    vec3 diffuse;         // albedo of what leaves where it entered
-    float diffuse_scale;  // one over the albedo of the diffuse lobe as it is
+    float under_interface;  // share of the diffuse light that comes through a layer's interface; cover_closure
+    float gloss;            // of the diffuse model
+    vec3 diffuse;           // albedo of what leaves where it entered
+    float diffuse_scale;    // one over the albedo of the diffuse lobe as it is
     float specular_probability;
     float diffuse_probability;
 };
@@ -170,6 +170,9 @@ float diffuse_lobe(Closure closure, vec3 light) {
 #endif
 }
 
+// Of diffuse light, about half way between its mean cosine and its most frequent one.
+const float mean_cosine = 0.6;
+
 // Of the interface without a film.
 Fresnel slab_fresnel(Slab slab) {
     vec3 f90 = vec3(1.0);
@@ -181,6 +184,94 @@ Fresnel slab_fresnel(Slab slab) {
     if ((slab.features & slab_f82) != 0u) f82 = slab.f82;
 #endif
     return make_fresnel(slab.f0, f90, f82);
+}
+
+// Index of refraction of a slab's medium by the reflectance of its interface. What reflects more than diamond does is
+// metal and hardly lets light through; how it would refract does not matter.
+float medium_ior(float f0) { return reflectance_to_ior(min(f0, 0.2)); }
+
+// Of diffuse light that hits the interface from the medium's side, what leaves: through a denser medium's surface as
+// much as enters it, spread over index^2 times the angle. At least 0.05, which is less than any dielectric's, so that
+// it may be divided by.
+vec3 internal_transmittance(Slab slab) {
+    vec3 mean = fresnel_mean_transmittance(slab_fresnel(slab));
+    vec3 ior = vec3(medium_ior(slab.f0.x), medium_ior(slab.f0.y), medium_ior(slab.f0.z));
+    return clamp(mean / (ior * ior), vec3(0.05), vec3(1.0));
+}
+
+#ifdef NACRE_SLAB_MEDIUM
+// What becomes of light inside the slab, for each channel.
+struct MediumScattering {
+    vec3 reflected;  // back to the interface
+    vec3 through;    // scattered, out of the far side
+    vec3 straight;   // out of the far side without an event
+    vec3 opaque;
+};
+
+// Light that goes up from the medium to the interface in all, where what it throws back is reflected again, and again.
+vec3 upwards_in_medium(vec3 reflected, vec3 leaving, vec3 reflected_again) {
+    return reflected / max((vec3(1.0) - reflected_again) + leaving * reflected_again, vec3(1e-9));
+}
+
+// One channel. The authored albedo has the interface's part in it, which lets `leaving` of diffuse light out and throws
+// the rest back into the medium: the medium's own is higher.
+Scattering channel_scattering(float albedo, float leaving, float mean_free_path, Slab slab, float cosine) {
+    float sum = leaving + (1.0 - leaving) * albedo;
+    return medium_scattering(albedo / sum, leaving * (1.0 - albedo) / sum,
+                             optical_depth(mean_free_path, slab.thickness), slab.phase_anisotropy, cosine);
+}
+
+// cosine: inside the medium.
+MediumScattering slab_scattering(Slab slab, float cosine) {
+    vec3 leaving = internal_transmittance(slab);
+    Scattering x = channel_scattering(slab.albedo.x, leaving.x, slab.mean_free_path.x, slab, cosine);
+    Scattering y = channel_scattering(slab.albedo.y, leaving.y, slab.mean_free_path.y, slab, cosine);
+    Scattering z = channel_scattering(slab.albedo.z, leaving.z, slab.mean_free_path.z, slab, cosine);
+    MediumScattering medium;
+    medium.reflected = vec3(x.reflected, y.reflected, z.reflected);
+    medium.through = vec3(x.through, y.through, z.through);
+    medium.straight = vec3(x.straight, y.straight, z.straight);
+    medium.opaque = vec3(x.opaque, y.opaque, z.opaque);
+    return medium;
+}
+#endif
+
+// The closure with the probabilities by which its lobes are sampled: by what each sends to the view.
+Closure with_probabilities(Closure closure) {
+    Closure result = closure;
+    vec3 diffuse = closure.diffuse;
+#ifdef NACRE_SLAB_MEDIUM
+    if ((closure.features & slab_medium) != 0u) diffuse += closure.thin + closure.subsurface;
+#endif
+    result.specular_probability = largest(closure.specular.albedo);
+    result.diffuse_probability = largest(diffuse);
+    float sum = result.specular_probability + result.diffuse_probability;
+#ifdef NACRE_SLAB_SECOND_LOBE
+    result.second_probability = (closure.features & slab_second_lobe) != 0u ? largest(closure.second.albedo) : 0.0;
+    sum += result.second_probability;
+#endif
+#ifdef NACRE_SLAB_FUZZ
+    result.fuzz_probability = (closure.features & slab_fuzz) != 0u ? largest(closure.fuzz) : 0.0;
+    sum += result.fuzz_probability;
+#endif
+#ifdef NACRE_SLAB_MEDIUM
+    result.transmission_probability = (closure.features & slab_medium) != 0u ? largest(closure.transmission) : 0.0;
+    sum += result.transmission_probability;
+#endif
+    // One over less would be infinite.
+    float scale = sum > 1e-30 ? 1.0 / sum : 0.0;
+    result.specular_probability *= scale;
+    result.diffuse_probability *= scale;
+#ifdef NACRE_SLAB_SECOND_LOBE
+    result.second_probability *= scale;
+#endif
+#ifdef NACRE_SLAB_FUZZ
+    result.fuzz_probability *= scale;
+#endif
+#ifdef NACRE_SLAB_MEDIUM
+    result.transmission_probability *= scale;
+#endif
+    return result;
 }
 
 Closure prepare_closure(Slab slab, vec3 view, float footprint) {
@@ -207,7 +298,6 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
     closure.glint_dy = slab.glint_dy;
 #endif
 #ifdef NACRE_SLAB_SECOND_LOBE
-    closure.second_probability = 0.0;
     if ((slab.features & slab_second_lobe) != 0u) {
         closure.second = make_specular_lobe(closure.fresnel, closure.view, slab.second_roughness, anisotropy);
         closure.specular.scale *= 1.0 - slab.second_weight;
@@ -215,24 +305,20 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
         closure.second.scale *= slab.second_weight;
         closure.second.albedo *= slab.second_weight;
         passed = mix(closure.specular.passed, closure.second.passed, slab.second_weight);
-        closure.second_probability = largest(closure.second.albedo);
     }
 #endif
     float uncovered = 1.0;
 #ifdef NACRE_SLAB_FUZZ
-    closure.fuzz_probability = 0.0;
     if ((slab.features & slab_fuzz) != 0u) {
         float reflected = slab.fuzz_amount * sheen_albedo(min(closure.view.z, 1.0), slab.fuzz_roughness);
         uncovered = 1.0 - reflected;
         closure.fuzz = reflected * slab.fuzz_color;
         closure.fuzz_map = sheen_map(closure.view, slab.fuzz_roughness);
-        closure.fuzz_probability = largest(closure.fuzz);
         closure.specular.scale *= uncovered;
         closure.specular.albedo *= uncovered;
 #ifdef NACRE_SLAB_SECOND_LOBE
         closure.second.scale *= uncovered;
         closure.second.albedo *= uncovered;
-        closure.second_probability *= uncovered;
 #endif
     }
 #endif
@@ -253,61 +339,68 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
         closure.specular.albedo *= tint;
 #ifdef NACRE_SLAB_SECOND_LOBE
         if ((slab.features & slab_second_lobe) != 0u) closure.second.albedo *= tint;
-        closure.second_probability *= largest(tint);
 #endif
     }
 #endif
-    closure.specular_probability = largest(closure.specular.albedo);
-    vec3 diffuse = closure.diffuse;
 #ifdef NACRE_SLAB_MEDIUM
-    closure.transmission_probability = 0.0;
     if ((slab.features & slab_medium) != 0u) {
         closure.reflectance = dot(slab.f0, vec3(1.0 / 3.0));
         closure.depth = vec3(optical_depth(slab.mean_free_path.x, slab.thickness),
                              optical_depth(slab.mean_free_path.y, slab.thickness),
                              optical_depth(slab.mean_free_path.z, slab.thickness));
         float inside = refracted_cosine(closure.view.z, closure.reflectance);
-        Scattering x = medium_scattering(slab.albedo.x, closure.depth.x, slab.phase_anisotropy, inside);
-        Scattering y = medium_scattering(slab.albedo.y, closure.depth.y, slab.phase_anisotropy, inside);
-        Scattering z = medium_scattering(slab.albedo.z, closure.depth.z, slab.phase_anisotropy, inside);
-        vec3 opaque = vec3(x.opaque, y.opaque, z.opaque);
+        vec3 leaving = internal_transmittance(slab);
+        MediumScattering medium = slab_scattering(slab, inside);
+        MediumScattering again = slab_scattering(slab, mean_cosine);
+        vec3 upwards = upwards_in_medium(medium.reflected, leaving, again.reflected);
         vec3 share = vec3(subsurface_share(slab.albedo.x, slab.mean_free_path.x, footprint),
                           subsurface_share(slab.albedo.y, slab.mean_free_path.y, footprint),
                           subsurface_share(slab.albedo.z, slab.mean_free_path.z, footprint));
-        diffuse = entering * vec3(x.reflected, y.reflected, z.reflected);
-        closure.thin = diffuse * (vec3(1.0) - opaque);
-        closure.subsurface = diffuse * opaque * share;
-        closure.diffuse = diffuse * opaque * (vec3(1.0) - share);
-        closure.transmission = entering * vec3(x.through, y.through, z.through);
-        closure.straight = entering * vec3(x.straight, y.straight, z.straight);
-        closure.transmission_probability = largest(closure.transmission);
+        vec3 diffuse = entering * min(upwards * leaving, vec3(1.0));
+        closure.thin = diffuse * (vec3(1.0) - medium.opaque);
+        closure.subsurface = diffuse * medium.opaque * share;
+        closure.diffuse = diffuse * medium.opaque * (vec3(1.0) - share);
+        closure.transmission =
+            entering * (medium.through + (vec3(1.0) - leaving) * upwards * (again.through + again.straight));
+        closure.straight = entering * medium.straight;
     }
 #endif
-    closure.diffuse_probability = largest(diffuse);
-    float sum = closure.specular_probability + closure.diffuse_probability;
+    closure.under_interface = 0.0;
+    return with_probabilities(closure);
+}
+
+// A closure that is seen through layers. spread: share of what its specular lobes send that does not come along them,
+// but as diffuse light does, having been scattered or thrown back on its way. under_interface: share of its light that
+// comes through an interface, which lets little in along the surface.
+Closure cover_closure(Closure closure, vec3 spread, float under_interface) {
+    Closure covered = closure;
+    vec3 sharp = vec3(1.0) - spread;
+    vec3 specular = closure.specular.albedo;
+    covered.specular.scale *= sharp;
+    covered.specular.albedo *= sharp;
 #ifdef NACRE_SLAB_SECOND_LOBE
-    sum += closure.second_probability;
+    if ((closure.features & slab_second_lobe) != 0u) {
+        specular += closure.second.albedo;
+        covered.second.scale *= sharp;
+        covered.second.albedo *= sharp;
+    }
 #endif
-#ifdef NACRE_SLAB_FUZZ
-    sum += closure.fuzz_probability;
+    covered.diffuse += specular * spread;
+    covered.under_interface = under_interface;
+    return with_probabilities(covered);
+}
+
+// Of diffuse light under an interface by the direction that it comes from, relative to its mean: by Schlick's formula
+// the same for all dielectrics. Over the mean of (1 - c)^5 over the lobe of Chan's model (a fit from below, so that no
+// energy is made), or over Lambert's.
+float interface_factor(Closure closure, vec3 light) {
+#if NACRE_DIFFUSE_MODEL == 0
+    float m = 1.0 - min(closure.view.z, 1.0);
+    float mean = mix(0.042 + m * m * (0.03 + 0.0115 * square(square(m))), 0.0374, chan_glossiness(closure.gloss));
+#else
+    float mean = 0.037;
 #endif
-#ifdef NACRE_SLAB_MEDIUM
-    sum += closure.transmission_probability;
-#endif
-    // One over less would be infinite.
-    float scale = sum > 1e-30 ? 1.0 / sum : 0.0;
-    closure.specular_probability *= scale;
-    closure.diffuse_probability *= scale;
-#ifdef NACRE_SLAB_SECOND_LOBE
-    closure.second_probability *= scale;
-#endif
-#ifdef NACRE_SLAB_FUZZ
-    closure.fuzz_probability *= scale;
-#endif
-#ifdef NACRE_SLAB_MEDIUM
-    closure.transmission_probability *= scale;
-#endif
-    return closure;
+    return mix(1.0, schlick_rest(min(light.z, 1.0), 1.0 - min(light.z, 1.0)) / (1.0 - mean), closure.under_interface);
 }
 
 vec3 specular_lobe_value(SpecularLobe lobe, vec3 view, vec3 light, vec3 h) {
@@ -356,6 +449,11 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
         value.subsurface = closure.subsurface * (light.z / pi);
     }
 #endif
+    if (closure.under_interface > 0.0) {
+        float factor = interface_factor(closure, light);
+        value.diffuse *= factor;
+        value.subsurface *= factor;
+    }
     return value;
 }
 
@@ -492,24 +590,5 @@ float slab_coverage(Slab slab, float cos_theta) {
     return min(slab.coverage * rest + slab.edge_coverage * left, 1.0);
 }
 #endif
-
-// Of diffuse light that hits the interface from the medium's side: what leaves through a denser medium's surface is
-// what enters it, spread over index^2 times the angle.
-float internal_reflectance_of(float f0, float mean) { return 1.0 - (1.0 - mean) / square(reflectance_to_ior(f0)); }
-
-vec3 internal_reflectance(Slab slab) {
-    Fresnel fresnel = make_fresnel(slab.f0, vec3(1.0), vec3(1.0));
-    vec3 mean = fresnel_mean(fresnel);
-    return vec3(internal_reflectance_of(slab.f0.x, mean.x), internal_reflectance_of(slab.f0.y, mean.y),
-                internal_reflectance_of(slab.f0.z, mean.z));
-}
-
-// What a diffuse base of albedo base_albedo under an interface sends out, relative to its first bounce: the light that
-// the interface throws back hits the base again, and again. Source: OpenPBR, "Coat darkening".
-vec3 bounce_factor(vec3 internal, vec3 base_albedo) {
-    vec3 passed = vec3(1.0) - internal;
-    // Written so that nothing is lost where both are 1.
-    return (passed + vec3(1e-9)) / (passed + internal * (vec3(1.0) - base_albedo) + vec3(1e-9));
-}
 
 #endif

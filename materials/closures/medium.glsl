@@ -13,10 +13,11 @@ const float longest_length = 1e12;
 // The similarity parameter sqrt((1 - w) / (1 - w g)), w being the albedo of a single scattering and g the phase
 // anisotropy, of a medium that reflects `albedo` if it is infinitely thick, and back. 0: nothing is absorbed, 1:
 // nothing is scattered. Source: van de Hulst 1980, in the form of Kulla and Conty 2017; round trip within 2e-5.
-float medium_similarity(float albedo) {
+// darkness: 1 - albedo, which has more digits than the albedo where both follow from something else.
+float medium_similarity(float albedo, float darkness) {
     float root = sqrt(9.59217 + albedo * (41.6808 + albedo * 17.7126));
     // 4.09712 + 4.20863 albedo - root, multiplied out so that the ends are exact and no digits cancel.
-    return clamp(7.19424 * (1.0 - albedo) / (4.09712 + 4.20863 * albedo + root), 0.0, 1.0);
+    return clamp(7.19424 * darkness / (4.09712 + 4.20863 * albedo + root), 0.0, 1.0);
 }
 
 // 1 - medium_similarity, with all digits where that is near 1: the same fit multiplied out from the other end.
@@ -61,11 +62,12 @@ struct Scattering {
 // Rows of the table: optical depths 2^-8 to 2^12.
 float medium_table_row(float depth) { return saturated((log2(clamp(depth, 1e-6, 1e6)) + 8.0) / 20.0); }
 
-// cosine: inside the medium. Directions of scattering are not told apart: a phase function g counts as the isotropic
-// one whose depth is scaled by 1 - w g (van de Hulst's similarity). Nothing is lost where nothing is absorbed.
-Scattering medium_scattering(float albedo, float depth, float phase_anisotropy, float cosine) {
+// darkness: 1 - albedo. cosine: inside the medium. Directions of scattering are not told apart: a phase function g
+// counts as the isotropic one whose depth is scaled by 1 - w g (van de Hulst's similarity). Nothing is lost where
+// nothing is absorbed.
+Scattering medium_scattering(float albedo, float darkness, float depth, float phase_anisotropy, float cosine) {
     Scattering result;
-    float similarity = medium_similarity(albedo);
+    float similarity = medium_similarity(albedo, darkness);
     float dissimilarity = medium_dissimilarity(albedo);
     float single = dissimilarity * (2.0 - dissimilarity);
     float inverse = 1.0 / (1.0 - phase_anisotropy * similarity * similarity);
@@ -83,7 +85,6 @@ Scattering medium_scattering(float albedo, float depth, float phase_anisotropy, 
     result.opaque = hit * hit * saturated(2.0 * back - 1.0);
     // An infinitely thick medium reflects its albedo towards every angle, as an opaque one does.
     float toward_albedo = mix(1.0, albedo / max(single * infinite.y, 1e-30), result.opaque);
-    result.reflected = min(escaping * back * (similarity > 0.0 ? toward_albedo : 1.0), 1.0);
     // Of the light that the isotropic medium lets through straight, this one scatters some forward; a backward phase
     // function takes some of it.
     float inside = max(cosine, smallest_cosine);
@@ -93,6 +94,10 @@ Scattering medium_scattering(float albedo, float depth, float phase_anisotropy, 
                                                              : -result.straight * exponential_rest(-forward));
     result.through = max(through, 0.0);
     result.straight = max(result.straight + min(through, 0.0), 0.0);
+    // What is added for that must be there to be had.
+    float reflected = escaping * back;
+    float added = similarity > 0.0 ? reflected * (toward_albedo - 1.0) : 0.0;
+    result.reflected = reflected + min(added, max(1.0 - reflected - result.through - result.straight, 0.0));
     return result;
 }
 

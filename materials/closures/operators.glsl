@@ -10,23 +10,36 @@ float roughness_to_variance(float roughness) {
     return a / (1.0 - a);
 }
 
-float variance_to_roughness(float variance) {
-    return sqrt(pow(variance / (1.0 + variance), 1.0 / 1.1));
+float variance_to_roughness(float variance) { return sqrt(pow(variance / (1.0 + variance), 1.0 / 1.1)); }
+
+// Variance that a rough interface adds to what is seen through it: refraction of the view on its way in and of the
+// light on its way out, each as wide outside as a lobe whose alpha is scaled by half of |n - 1| (Belcour 2018), at
+// normal incidence. A base of any roughness counts alike.
+float refraction_variance(float roughness, float ior) {
+    float a = pow(min(0.5 * (ior - 1.0) * roughness * roughness, 0.9999), 1.1);
+    return 2.0 * a / (1.0 - a);
 }
 
-// Variance that a rough interface adds to what is seen through it: refraction of the light on its way in and of the
-// view on its way out, each that of a lobe whose alpha is scaled by half of |n - 1| / n and |n - 1| (Belcour 2018),
-// for index 1.5 and at normal incidence. A base of any roughness counts alike.
-float refraction_variance(float roughness) {
-    float alpha = roughness * roughness;
-    float into = pow(min(alpha * (1.0 / 6.0), 0.9999), 1.1);
-    float out_of = pow(min(alpha * 0.25, 0.9999), 1.1);
-    return into / (1.0 - into) + out_of / (1.0 - out_of);
+// A lobe that leaves a denser medium is wider outside by its index; its variance is a power of alpha.
+float refraction_stretch(float ior) { return pow(ior, 1.1); }
+
+// How much wider what lies below is seen: its variance times `stretch`, and `variance` in addition.
+struct Widening {
+    float stretch;
+    float variance;
+};
+
+Widening no_widening() {
+    Widening widening;
+    widening.stretch = 1.0;
+    widening.variance = 0.0;
+    return widening;
 }
 
-// Perceptual roughness of a slab as it is seen through what adds a variance.
-float tracked_roughness(float roughness, float variance) {
-    return variance > 0.0 ? variance_to_roughness(roughness_to_variance(roughness) + variance) : roughness;
+// Perceptual roughness of a slab as it is seen through what widens it.
+float tracked_roughness(float roughness, Widening widening) {
+    if (widening.variance <= 0.0 && widening.stretch <= 1.0) return roughness;
+    return variance_to_roughness(roughness_to_variance(roughness) * widening.stretch + widening.variance);
 }
 
 // What the operators of a tree do to the matter they arrange: what is tracked follows Hillaire and de Rousiers,
@@ -36,25 +49,43 @@ float tracked_roughness(float roughness, float variance) {
 // How much what is seen through a subtree spreads. Known before any closure is, since closures depend on it.
 struct Spread {
     float coverage;
-    float variance;  // that the covered share adds to the slopes of what lies below
+    float stretch;   // of the variance of what lies below, by the covered share
+    float variance;  // that the covered share adds to it
 };
 
-// A slab, or what stands for a subtree, as what lies below it sees it. The last five are those of the covered share;
-// where nothing is covered they mean nothing.
+// What a layer does with light from below: what it throws back, and what leaves it. The two make 1 where nothing is
+// absorbed; what the medium takes of light that leaves is not in it, but in Matter::transmittance.
+struct Underside {
+    vec3 back;
+    vec3 leaving;
+};
+
+// A slab, or what stands for a subtree, as what lies below and above it sees it. All but coverage are those of the
+// covered share; where nothing is covered they mean nothing.
 struct Matter {
     float coverage;
-    vec3 transmittance;       // straight through the medium along the normal
+    vec3 transmittance;       // of light along the normal that is not scattered back: what the medium leaves of it
     vec3 view_transmittance;  // of what is seen through it in the view direction: interface, fuzz and medium
-    vec3 internal;            // reflectance for diffuse light from below
+    Underside diffuse;        // for diffuse light from below
+    Underside mirrored;       // for light that comes about along the mirrored view
+    Underside trapped;        // for light that comes at the angles at which it was totally reflected before
     vec3 albedo;              // reflectance for diffuse light from above
     vec3 passed;              // of diffuse light from above, what reaches the other side
+    vec3 gloss;               // share of what is reflected towards the view that a lobe mirrors
+    float alpha2;             // squared GGX alpha of that lobe, as it is seen from outside
+    float ior;                // against what lies above
+    float under_interface;    // of light from above, share that comes through an interface
+    vec3 scattered;           // of light that passes, share that was scattered, and not only forwards
+    float cos_view;
 };
 
 // How a slab is seen through all that lies above it.
 struct Path {
-    vec3 weight;         // of the slab's radiance, without its own coverage
-    vec3 uncovered;      // share of `weight` that passes by all matter above, [0, 1]
-    vec3 transmittance;  // of the rest for light, along the normal; top_transmittance turns it to the light
+    vec3 weight;            // of the slab's radiance, without its own coverage
+    vec3 uncovered;         // share of `weight` that passes by all matter above, [0, 1]
+    vec3 transmittance;     // of the rest for light, along the normal; top_transmittance turns it to the light
+    vec3 spread;            // share of what a lobe mirrors that comes up as diffuse light
+    float under_interface;  // share of the light that comes through an interface
 };
 
 #ifndef NACRE_SLAB_EDGE_COVERAGE
@@ -64,7 +95,16 @@ float slab_coverage(Slab slab, float cos_theta) { return slab.coverage; }
 Spread slab_spread(Slab slab, float cos_view) {
     Spread spread;
     spread.coverage = slab_coverage(slab, cos_view);
-    spread.variance = refraction_variance(slab.roughness);
+    spread.stretch = 1.0;
+    spread.variance = 0.0;
+#ifdef NACRE_SLAB_MEDIUM
+    // Nothing is seen through the others.
+    if ((slab.features & slab_medium) != 0u) {
+        float ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
+        spread.stretch = refraction_stretch(ior);
+        spread.variance = refraction_variance(slab.roughness, ior);
+    }
+#endif
     return spread;
 }
 
@@ -77,39 +117,62 @@ Spread cover_spread(Spread spread, float amount) {
 Spread mix_spread(Spread a, Spread b, float amount) {
     Spread spread;
     spread.coverage = (1.0 - amount) * a.coverage + amount * b.coverage;
-    float sum = (1.0 - amount) * a.coverage * a.variance + amount * b.coverage * b.variance;
-    spread.variance = sum / max(spread.coverage, 1e-30);
+    float share = amount * b.coverage / max(spread.coverage, 1e-30);
+    spread.stretch = mix(a.stretch, b.stretch, share);
+    spread.variance = mix(a.variance, b.variance, share);
     return spread;
+}
+
+// What lies below a layer, by what is above both.
+Widening widening_below(Widening above, Spread top) {
+    Widening widening;
+    widening.stretch = above.stretch * mix(1.0, top.stretch, top.coverage);
+    widening.variance = above.variance + above.stretch * top.coverage * top.variance;
+    return widening;
 }
 
 Spread layer_spread(Spread top, Spread base) {
+    Widening above = no_widening();
+    Widening both = widening_below(widening_below(above, top), base);
     Spread spread;
     spread.coverage = top.coverage + (1.0 - top.coverage) * base.coverage;
-    spread.variance = (top.coverage * top.variance + base.coverage * base.variance) / max(spread.coverage, 1e-30);
+    float covered = max(spread.coverage, 1e-30);
+    spread.stretch = 1.0 + (both.stretch - 1.0) / covered;
+    spread.variance = both.variance / covered;
     return spread;
 }
 
-// Variance of what lies below a layer, by that above both.
-float variance_below(float above, Spread top) { return above + top.coverage * top.variance; }
-
-Slab track_slab(Slab slab, float variance) {
+Slab track_slab(Slab slab, Widening widening) {
     Slab tracked = slab;
-    tracked.roughness = tracked_roughness(slab.roughness, variance);
+    tracked.roughness = tracked_roughness(slab.roughness, widening);
     return tracked;
 }
-
-// Of diffuse light, about half way between its mean cosine and its most frequent one.
-const float mean_cosine = 0.6;
 
 Matter no_matter() {
     Matter m;
     m.coverage = 0.0;
     m.transmittance = vec3(1.0);
     m.view_transmittance = vec3(1.0);
-    m.internal = vec3(0.0);
+    m.diffuse.back = vec3(0.0);
+    m.diffuse.leaving = vec3(1.0);
+    m.mirrored = m.diffuse;
+    m.trapped = m.diffuse;
     m.albedo = vec3(0.0);
     m.passed = vec3(1.0);
+    m.gloss = vec3(0.0);
+    m.alpha2 = 0.0;
+    m.ior = 1.0;
+    m.under_interface = 0.0;
+    m.scattered = vec3(0.0);
+    m.cos_view = 1.0;
     return m;
+}
+
+Underside mix_underside(Underside a, Underside b, vec3 share) {
+    Underside u;
+    u.back = mix(a.back, b.back, share);
+    u.leaving = mix(a.leaving, b.leaving, share);
+    return u;
 }
 
 Path open_path() {
@@ -117,31 +180,64 @@ Path open_path() {
     path.weight = vec3(1.0);
     path.uncovered = vec3(1.0);
     path.transmittance = vec3(1.0);
+    path.spread = vec3(0.0);
+    path.under_interface = 0.0;
     return path;
+}
+
+// A medium that lets `through` pass of diffuse light and reflects `reflected`, under an interface that lets `leaving`
+// out.
+Underside underside_of(vec3 leaving, vec3 reflected, vec3 through) {
+    vec3 kept = vec3(1.0) - reflected;
+    vec3 between = vec3(1.0) / max(kept + leaving * reflected, vec3(1e-9));
+    Underside u;
+    u.back = min(reflected + through * through * (vec3(1.0) - leaving) * between, vec3(1.0));
+    u.leaving = kept * leaving * between;
+    return u;
 }
 
 // What a layer above a slab needs to know of it: the albedo is that under diffuse light.
 Matter base_matter(Slab slab, float cos_view) {
     Matter m = no_matter();
     m.coverage = slab_coverage(slab, cos_view);
+    m.cos_view = cos_view;
+    m.alpha2 = square(square(slab.roughness));
+    m.ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
+    m.under_interface = saturated(largest(slab.f0) / smallest_reflectance);
+    vec3 leaving = internal_transmittance(slab);
+    vec3 albedo = slab.albedo;
+    vec3 out_of_medium = vec3(0.0);
     vec3 reflected = slab.albedo;
     vec3 through = vec3(0.0);
+    vec3 scattered = vec3(1.0);
+    m.transmittance = vec3(0.0);
 #ifdef NACRE_SLAB_MEDIUM
     if ((slab.features & slab_medium) != 0u) {
-        float inside = refracted_cosine(mean_cosine, dot(slab.f0, vec3(1.0 / 3.0)));
-        Scattering x = medium_scattering(slab.albedo.x, optical_depth(slab.mean_free_path.x, slab.thickness),
-                                         slab.phase_anisotropy, inside);
-        Scattering y = medium_scattering(slab.albedo.y, optical_depth(slab.mean_free_path.y, slab.thickness),
-                                         slab.phase_anisotropy, inside);
-        Scattering z = medium_scattering(slab.albedo.z, optical_depth(slab.mean_free_path.z, slab.thickness),
-                                         slab.phase_anisotropy, inside);
-        reflected = vec3(x.reflected, y.reflected, z.reflected);
-        through = vec3(x.through + x.straight, y.through + y.straight, z.through + z.straight);
+        MediumScattering medium = slab_scattering(slab, mean_cosine);
+        reflected = medium.reflected;
+        through = medium.through + medium.straight;
+        scattered = medium.through / max(through, vec3(1e-30));
+        vec3 upwards = upwards_in_medium(reflected, leaving, reflected);
+        albedo = min(upwards * leaving, vec3(1.0));
+        out_of_medium = through * (vec3(1.0) + upwards * (vec3(1.0) - leaving));
+        m.transmittance =
+            exp(log(clamp(through / max(vec3(1.0) - reflected, vec3(1e-6)), vec3(1e-30), vec3(1.0))) * mean_cosine);
     }
 #endif
-    vec3 mean = fresnel_mean(slab_fresnel(slab));
-    m.albedo = mean + (vec3(1.0) - mean) * reflected;
-    m.passed = (vec3(1.0) - mean) * through;
+#ifdef NACRE_SLAB_MEDIUM
+    m.scattered = scattered * (1.0 - max(slab.phase_anisotropy, 0.0));
+#endif
+    Fresnel fresnel = slab_fresnel(slab);
+    vec3 mean = fresnel_mean(fresnel);
+    m.albedo = mean + (vec3(1.0) - mean) * albedo;
+    m.passed = (vec3(1.0) - mean) * out_of_medium;
+    m.gloss = mean / max(m.albedo, vec3(1e-30));
+    m.diffuse = underside_of(leaving, reflected, through);
+    // Light that was scattered on its way in is diffuse when it comes back.
+    m.mirrored =
+        mix_underside(underside_of(fresnel_transmittance(fresnel, cos_view), reflected, through), m.diffuse, scattered);
+    // A fit: 0.124 at index 1.5, for lobes so narrow that they hardly let anything escape that was reflected once.
+    m.trapped = mix_underside(underside_of(exp(log(leaving) * 2.3), reflected, through), m.diffuse, scattered);
 #ifdef NACRE_SLAB_FUZZ
     if ((slab.features & slab_fuzz) != 0u) {
         float fuzz = slab.fuzz_amount * sheen_albedo(mean_cosine, slab.fuzz_roughness);
@@ -155,10 +251,42 @@ Matter base_matter(Slab slab, float cos_view) {
 // A slab as what lies below and around it sees it.
 Matter slab_matter(Slab slab, Closure closure) {
     Matter m = base_matter(slab, closure.view.z);
-    m.transmittance = closure_transmittance(closure, 1.0);
     m.view_transmittance = closure_throughput(closure) + closure_albedo(closure).transmission;
-    m.internal = internal_reflectance(slab);
     return m;
+}
+
+// What a layer throws back to the base below it, again and again. Diffuse light: (1 - K) / (1 - E K) (OpenPBR, "Coat
+// darkening"). What a lobe mirrors meets the layer's surface as the view did, K near Fresnel's reflectance, and the
+// more as diffuse light does the wider the lobe is; what was totally reflected comes back at such angles again. Both
+// widths are fits to random walks between a GGX lobe and a smooth interface of index 1.5, off by 0.1; the layer's own
+// facets turn light half as far as those of the base.
+struct Bounces {
+    vec3 leaving;   // of what the base reflects, by its first reflection
+    vec3 arriving;  // at the base, by what arrives there first
+    vec3 spread;    // share of `leaving` that the first reflection's lobe does not hold any more
+};
+
+Bounces bounces_between(Matter top, Matter base) {
+    // Inside the layer the lobe is as narrow as it was before it was refracted.
+    float alpha = max(sqrt(base.alpha2 / square(top.ior) + 0.25 * top.alpha2), 1e-6);
+    float cosine = max(base.cos_view, 0.01);
+    vec3 width = vec3(1.0 - exp(-7.0 * pow(alpha, 0.3 + 1.5 * cosine)));
+    vec3 width_later = vec3(1.0 - exp(-60.0 * pow(alpha, 1.35) / pow(cosine, 1.7)));
+    vec3 narrow = vec3(exp(-alpha / 0.27));
+    Underside first = mix_underside(top.diffuse, mix_underside(top.mirrored, top.diffuse, width), base.gloss);
+    Underside returning = mix_underside(top.diffuse, top.trapped, narrow);
+    Underside later = mix_underside(top.diffuse, mix_underside(top.mirrored, returning, width_later), base.gloss);
+    // 1 - back * albedo by positive terms: nothing is lost where both are 1.
+    vec3 left = later.leaving + max(vec3(1.0) - later.back - later.leaving, vec3(0.0)) +
+                later.back * (vec3(1.0) - base.albedo) + vec3(1e-9);
+    vec3 again = first.back * base.albedo;
+    Bounces bounces;
+    vec3 again_leaving = again * (later.leaving + vec3(1e-9)) / left;
+    bounces.leaving = first.leaving + again_leaving;
+    // Light that was thrown back still leaves about along the lobe for more than a half (by random walks as well).
+    bounces.spread = 0.4 * width_later * again_leaving / max(bounces.leaving, vec3(1e-30));
+    bounces.arriving = vec3(1.0) + again / left;
+    return bounces;
 }
 
 // Of what lies below, seen through matter that covers only a part.
@@ -171,6 +299,16 @@ Matter cover_matter(Matter m, float amount) {
     return covered;
 }
 
+// Of two kinds of matter, by what each reflects.
+vec3 gloss_of_both(Matter a, vec3 reflected_a, Matter b, vec3 reflected_b) {
+    return (reflected_a * a.gloss + reflected_b * b.gloss) / max(reflected_a + reflected_b, vec3(1e-30));
+}
+float alpha2_of_both(Matter a, vec3 reflected_a, Matter b, vec3 reflected_b) {
+    float mirrored_a = largest(reflected_a * a.gloss);
+    float mirrored_b = largest(reflected_b * b.gloss);
+    return (mirrored_a * a.alpha2 + mirrored_b * b.alpha2) / max(mirrored_a + mirrored_b, 1e-30);
+}
+
 // Side by side: a on 1 - amount of the surface, b on the rest.
 Matter mix_matter(Matter a, Matter b, float amount) {
     float covered_a = (1.0 - amount) * a.coverage;
@@ -181,10 +319,28 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     float share = covered_b / m.coverage;
     m.transmittance = mix(a.transmittance, b.transmittance, share);
     m.view_transmittance = mix(a.view_transmittance, b.view_transmittance, share);
-    m.internal = mix(a.internal, b.internal, share);
+    m.diffuse = mix_underside(a.diffuse, b.diffuse, vec3(share));
+    m.mirrored = mix_underside(a.mirrored, b.mirrored, vec3(share));
+    m.trapped = mix_underside(a.trapped, b.trapped, vec3(share));
     m.albedo = mix(a.albedo, b.albedo, share);
     m.passed = mix(a.passed, b.passed, share);
+    m.gloss = gloss_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
+    m.alpha2 = alpha2_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
+    m.ior = mix(a.ior, b.ior, share);
+    m.under_interface = mix(a.under_interface, b.under_interface, share);
+    m.scattered = mix(a.scattered, b.scattered, share);
+    m.cos_view = a.cos_view;
     return m;
+}
+
+// The undersides of two layers, by the shares of the surface where the top, the base and both are.
+Underside layer_underside(Underside top, Underside base, Matter base_matter, float t, float b, float tb) {
+    vec3 between = vec3(1.0) / max(vec3(1.0) - base_matter.albedo * top.back, vec3(1e-6));
+    vec3 back = base.back + base.leaving * base_matter.transmittance * top.back * base_matter.passed * between;
+    Underside u;
+    u.back = t * top.back + b * base.back + tb * min(back, vec3(1.0));
+    u.leaving = t * top.leaving + b * base.leaving + tb * min(base.leaving * top.leaving * between, vec3(1.0));
+    return u;
 }
 
 // One above the other, lying independently: both on C_t C_b of the surface, either alone on the rest.
@@ -199,18 +355,25 @@ Matter layer_matter(Matter top, Matter base) {
     float b = only_base / m.coverage;
     float tb = both / m.coverage;
     m.transmittance = t * top.transmittance + b * base.transmittance + tb * top.transmittance * base.transmittance;
-    m.view_transmittance =
-        t * top.view_transmittance + b * base.view_transmittance +
-        tb * top.view_transmittance * base.view_transmittance;
-    // Light goes on between the top, from below, and the base, from above.
-    vec3 between = vec3(1.0) / max(vec3(1.0) - base.albedo * top.internal, vec3(1e-6));
-    vec3 internal =
-        base.internal + (vec3(1.0) - base.internal) * base.transmittance * top.internal * base.passed * between;
-    vec3 albedo = top.albedo + top.passed * base.albedo * bounce_factor(top.internal, base.albedo) * top.transmittance;
-    vec3 passed = top.passed * base.passed * between;
-    m.internal = t * top.internal + b * base.internal + tb * min(internal, vec3(1.0));
-    m.albedo = t * top.albedo + b * base.albedo + tb * min(albedo, vec3(1.0));
+    m.view_transmittance = t * top.view_transmittance + b * base.view_transmittance +
+                           tb * top.view_transmittance * base.view_transmittance;
+    Bounces bounces = bounces_between(top, base);
+    vec3 below = top.passed * base.albedo * bounces.leaving * top.transmittance;
+    vec3 passed = top.passed * base.passed * bounces.arriving;
+    m.diffuse = layer_underside(top.diffuse, base.diffuse, base, t, b, tb);
+    m.mirrored = layer_underside(top.mirrored, base.mirrored, base, t, b, tb);
+    m.trapped = layer_underside(top.trapped, base.trapped, base, t, b, tb);
+    m.albedo = t * top.albedo + b * base.albedo + tb * min(top.albedo + below, vec3(1.0));
     m.passed = t * top.passed + b * base.passed + tb * min(passed, vec3(1.0));
+    vec3 of_top = (t + tb) * top.albedo;
+    vec3 of_base = b * base.albedo + tb * below;
+    m.gloss = gloss_of_both(top, of_top, base, of_base);
+    m.alpha2 = alpha2_of_both(top, of_top, base, of_base);
+    float only_above = (1.0 - top.under_interface * (t + tb)) * (1.0 - base.under_interface * (b + tb));
+    m.under_interface = 1.0 - only_above;
+    m.scattered = vec3(1.0) - (vec3(1.0) - top.scattered * (t + tb)) * (vec3(1.0) - base.scattered * (b + tb));
+    m.ior = mix(1.0, top.ior, t + tb) * mix(1.0, base.ior, b + tb);
+    m.cos_view = base.cos_view;
     return m;
 }
 
@@ -221,16 +384,22 @@ Path path_through_mix(Path path, float amount) {
     return above;
 }
 
-// A path that comes up from the base of a layer under `top`; `base_albedo` is that of all that lies below the top, to
-// the bottom of the material (Matter::albedo): light that is thrown back may hit any part of it.
-Path path_through_layer(Path path, Matter top, vec3 base_albedo) {
+// A path that comes up from the base of a layer under `top`; `base` is all that lies below the top, to the bottom of
+// the material: light that is thrown back may hit any part of it.
+Path path_through_layer(Path path, Matter top, Matter base) {
     vec3 beside = vec3(1.0 - top.coverage);
-    vec3 through = top.coverage * top.view_transmittance * bounce_factor(top.internal, base_albedo);
+    Bounces bounces = bounces_between(top, base);
+    vec3 through = top.coverage * top.view_transmittance * bounces.leaving;
     vec3 sum = beside + through;
     // Where nothing comes through the rest does not matter.
     vec3 by = beside / max(sum, vec3(1e-30));
     Path above;
     above.weight = path.weight * sum;
+    // Scattered on its way to the base or on its way back.
+    vec3 sharp = (vec3(1.0) - bounces.spread) * (vec3(1.0) - top.scattered) * (vec3(1.0) - top.scattered);
+    above.spread = vec3(1.0) - (vec3(1.0) - path.spread) * mix(sharp, vec3(1.0), by);
+    above.under_interface =
+        1.0 - (1.0 - path.under_interface) * (1.0 - top.under_interface * (1.0 - dot(by, vec3(1.0 / 3.0))));
     above.uncovered = path.uncovered * by;
     // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
     // that stands for both is between.

@@ -57,7 +57,7 @@ const float stored_thickness_octaves = 29.897353;
 
 // The medium with isotropic scattering that has the same similarity (materials/closures/medium.glsl).
 float isotropic_mean_free_path(float albedo, float mean_free_path, float phase_anisotropy) {
-    float similarity = medium_similarity(albedo);
+    float similarity = medium_similarity(albedo, 1.0 - albedo);
     return mean_free_path * (1.0 - phase_anisotropy * similarity * similarity) / (1.0 - phase_anisotropy);
 }
 

@@ -44,10 +44,12 @@ GgxAlbedo stretched_ggx_albedo(vec3 view, vec2 alpha) {
     float seen = sqrt(square(larger * along) + square(smaller * across));
     float cosine = min(view.z, 1.0);
     float ratio = smaller / larger;
+    // No ratio is below that of the smallest alpha: the axis begins there.
+    float least = pow(smallest_alpha / larger, 1.0 / 3.0);
+    float ratio_at = saturated((pow(ratio, 1.0 / 3.0) - least) / max(1.0 - least, 1e-6));
     // Straight down every azimuth is the same.
-    vec2 entry =
-        anisotropy_table(vec4(ggx_table_coordinate(cosine, seen), atan(sqrt(sqrt(ratio)) * across, along) * (2.0 / pi),
-                              pow(ratio, 1.0 / 3.0), sqrt(larger)));
+    vec2 entry = anisotropy_table(vec4(ggx_table_coordinate(cosine, seen),
+                                       atan(sqrt(sqrt(ratio)) * across, along) * (2.0 / pi), ratio_at, sqrt(larger)));
     GgxAlbedo albedo = ggx_albedo(cosine, seen);
     albedo.missing = entry.x;
     albedo.schlick = clamp(albedo.schlick + (entry.y - 0.25) * 0.5, 0.0, 1.0);

@@ -13,7 +13,7 @@
 /// axis | coordinate, 0 to 1
 /// 0    | sqrt(mu (1 + 3 p) / (mu + 3 p)), mu the cosine to the normal
 /// 1    | azimuth of the direction (cos phi, q^(1/4) sin phi), over a right angle
-/// 2    | q^(1/3)
+/// 2    | q^(1/3), from its least (of a smaller alpha of 1e-4) to 1
 /// 3    | sqrt(A)
 ///
 /// word | content

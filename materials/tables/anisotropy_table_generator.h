@@ -22,7 +22,7 @@ inline std::array<double, 2> anisotropy_table_entry(const std::array<std::uint32
     std::array<double, 4> at;
     for (int axis = 0; axis < 4; ++axis) at[axis] = index[axis] / (anisotropy_table_size[axis] - 1.0);
     const double larger = std::max(at[3] * at[3], 1e-3);
-    const double ratio = std::max(at[2] * at[2] * at[2], library.smallest_alpha / larger);
+    const double ratio = std::pow(std::lerp(std::cbrt(library.smallest_alpha / larger), 1.0, at[2]), 3.0);
     const double azimuth = 0.5 * std::numbers::pi * at[1];
     const double phi = std::atan2(std::sin(azimuth), std::pow(ratio, 0.25) * std::cos(azimuth));
     const glm::dvec2 alpha(larger, larger * ratio);

@@ -50,7 +50,7 @@ class Lighting final : public RenderPass {
         if (decisions.closures) {
             pass.uses(resources_.material_slices, ResourceUse::sampled);
             for (std::uint32_t table = 0; table < closure_table_count; ++table) {
-                if (context.materials.table(table)) {
+                if (context.closures.lighting().reads_table(table)) {
                     pass.uses(resources_.material_textures[context.materials.table_place(table)], ResourceUse::sampled);
                 }
             }
@@ -93,10 +93,9 @@ class Lighting final : public RenderPass {
                     entries.push_back({.binding = binding, .texture = texture, .sampler = context.nearest});
                     bindings.push_back({.binding = binding, .type = rhi::BindingType::combined_texture_sampler});
                 };
-                const std::uint32_t features = context.closures.lighting().features;
-                add(8, context.materials.table(0));
-                if ((features & materials::slab_medium) != 0) add(9, context.materials.table(1));
-                if ((features & materials::slab_anisotropy) != 0) add(10, context.materials.table(2));
+                for (std::uint32_t table = 0; table < closure_table_count; ++table) {
+                    if (context.closures.lighting().reads_table(table)) add(8 + table, context.materials.table(table));
+                }
                 if (resources_.material_slices) add(11, graph.texture(resources_.material_slices));
             }
             entries.push_back({.binding = 4, .buffer = graph.buffer(resources_.tile_lists)});

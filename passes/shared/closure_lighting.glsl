@@ -65,7 +65,7 @@ vec3 closure_radiance(Slab slab, Path path, StoredFrame frame, LitPoint point
     vec3 view = view_in_frame(frame, point.to_viewer);
     float roughness = slab.roughness;
     slab.roughness = max(slab.roughness, smallest_roughness_for_lights);
-    Closure closure = prepare_closure(slab, view, point.footprint);
+    Closure closure = cover_closure(prepare_closure(slab, view, point.footprint), path.spread, path.under_interface);
     ClosureAlbedo albedo = closure_albedo(closure);
 
     // Environment: each lobe's share of the light, from where the lobe looks.

@@ -99,6 +99,7 @@ Examples:
   nacre material my.json --profile mobile
   nacre material car.gltf#paint -o paint.png
   nacre material complex-opal --budget 48 --json -
+  nacre material dusty-car-paint --reference -o dusty.png    closures against brute force, with a ball of each
   nacre material gold --eval 0,0,1,0.6,0,0.8     what one closure after the other reflects: view x,y,z, light x,y,z
 )";
 
@@ -404,6 +405,8 @@ struct Definition {
         command->add_option("--budget", material.budget, "Bytes for each pixel instead of the profile's")
             ->type_name("BYTES")
             ->check(whole_number(4, 1024));
+        command->add_flag("--reference", material.reference,
+                          "Tell how far the closures are off a random walk through the stack (some seconds)");
         command->add_option("--eval", material.evaluate, "Print what each closure reflects: view and light, comma separated")
             ->type_name("DIRECTIONS");
         command->add_option("-o,--output", material.output, "Draw it")->type_name("FILE")->check(file_ending({".png"}));

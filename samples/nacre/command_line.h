@@ -69,6 +69,7 @@ struct MaterialArguments {
     bool full = false;                ///< Simplify to one closure, whatever the budget.
     std::string profile = "high";
     std::optional<std::uint32_t> budget;  ///< Bytes; empty: that of the profile.
+    bool reference = false;               ///< Compare with a random walk through the stack.
     std::string evaluate;             ///< "VX,VY,VZ,LX,LY,LZ"; empty: no value is asked for.
     std::string output;               ///< PNG; empty: none.
     std::string json;

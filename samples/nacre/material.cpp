@@ -13,6 +13,7 @@
 #include "materials/builtin_materials.h"
 #include "materials/description_tree.h"
 #include "materials/evaluation.h"
+#include "materials/layering_error.h"
 #include "materials/preview.h"
 #include "materials/simplification.h"
 #include "materials/storage.h"
@@ -157,6 +158,48 @@ void main() {{
         .compile_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count()};
 }
 
+// The closures against brute force, as text, for JSON, and drawn.
+struct ReferenceReport {
+    std::string text;
+    Json json;
+    MaterialSheetStep drawn;
+};
+
+Expected<ReferenceReport> reference_report(const FlattenedTree& flat) {
+    constexpr std::uint32_t paths = 65536, ball_paths = 4096;
+    const RandomWalk walk(flat);
+    const LayeringError error = layering_error(flat, walk, paths);
+    Image ball = walked_ball(walk, ball_size, ball_paths);
+    NACRE_TRY(const measure::FlipResult flip, measure::compute_flip(ball, preview_ball(flat, ball_size, 16)));
+    ReferenceReport report;
+    TextTable table({"cosine of view", "closures", "random walk", "+-"});
+    Json rows = Json::array();
+    for (std::size_t i = 0; i < LayeringError::cosines.size(); ++i) {
+        const auto color = [](const glm::dvec3& c) { return fmt::format("{:.4f} {:.4f} {:.4f}", c.x, c.y, c.z); };
+        const auto numbers = [](const glm::dvec3& c) { return Json::array({c.x, c.y, c.z}); };
+        const WalkAlbedo& seen = error.walk[i];
+        table.add({fmt::format("{:.1f}", LayeringError::cosines[i]), color(error.closures[i]), color(seen.reflected),
+                   color(seen.uncertainty)});
+        rows.push_back({{"cosine", LayeringError::cosines[i]},
+                        {"closures", numbers(error.closures[i])},
+                        {"walk", numbers(seen.reflected)},
+                        {"uncertainty", numbers(seen.uncertainty)}});
+    }
+    report.text = fmt::format(
+        "\nreference (random walk, {} paths for each view, 95 % confidence): albedo error {:.4f}, largest {:.4f}, FLIP "
+        "{:.4f}\n{}",
+        paths, error.mean, error.largest, flip.mean, table.text());
+    report.json = {{"paths", paths},
+                   {"albedo_error", error.mean},
+                   {"largest_albedo_error", error.largest},
+                   {"image_error", flip.mean},
+                   {"albedos", rows}};
+    report.drawn = {.captions = {"random walk", fmt::format("albedo error {:.4f}", error.mean),
+                                 fmt::format("FLIP {:.4f}", flip.mean)},
+                    .ball = std::move(ball)};
+    return report;
+}
+
 Outcome list_materials(const std::string& json) {
     TextTable table({"material", "bytes", "closures", "what it is"});
     Json rows = Json::array();
@@ -251,6 +294,13 @@ Outcome run(const MaterialArguments& arguments) {
                    fmt::format("{}", closure.frame), features_text(closure.features)});
     }
     text += slabs.text() + "\n" + steps.text();
+    Json reference;
+    if (arguments.reference) {
+        NACRE_TRY(ReferenceReport report, reference_report(flat));
+        text += report.text;
+        reference = std::move(report.json);
+        drawn.push_back(std::move(report.drawn));
+    }
     print_result(arguments.json, text);
     NACRE_CHECK(write_json(arguments.json, Json{{"name", tree.name},
                                                 {"profile", arguments.profile},
@@ -263,7 +313,8 @@ Outcome run(const MaterialArguments& arguments) {
                                                 {"shader_bytes", shader.bytes},
                                                 {"shader_compile_ms", shader.compile_ms},
                                                 {"fits", result.fits},
-                                                {"steps", step_rows}}
+                                                {"steps", step_rows},
+                                                {"reference", reference}}
                                                .dump(2)));
     if (!arguments.output.empty()) {
         const std::string title = fmt::format("{}  {} bytes, {}  profile {}", tree.name, layout.total_bytes(),

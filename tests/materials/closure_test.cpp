@@ -219,19 +219,23 @@ TEST(Closure, ExtremeInputsGiveFiniteValues) {
 
 TEST(Closure, BouncesBetweenInterfaceAndBaseAreASum) {
     Library library;
-    const glm::dvec3 internal(0.6, 0.0, 1.0), base(0.5, 0.5, 1.0);
-    const glm::dvec3 factor = library.bounce_factor(internal, base);
+    const glm::dvec3 internal(0.6, 0.0, 1.0), albedo(0.5, 0.5, 1.0);
+    Library::Matter top = library.no_matter(), base = library.no_matter();
+    top.diffuse.back = internal;
+    top.diffuse.leaving = 1.0 - internal;
+    base.albedo = albedo;
+    const glm::dvec3 factor = library.bounces_between(top, base).leaving;
     double sum = 0.0, left = 1.0;
     for (int i = 0; i < 200; ++i) {
         sum += left * (1.0 - internal.x);
-        left *= internal.x * base.x;
+        left *= internal.x * albedo.x;
     }
     EXPECT_NEAR(factor.x, sum, 1e-7);
     EXPECT_NEAR(factor.y, 1.0, 1e-7);
     EXPECT_NEAR(factor.z, 1.0, 1e-7) << "what loses nothing gives everything back";
     // 0.596 is the reflectance of an index of 1.5 from inside (Egan and Hilgeman 1979); Schlick's formula is off by
     // 0.003.
-    EXPECT_NEAR(library.internal_reflectance(Library::slab_of({.f0 = glm::vec3(0.04f)})).x, 0.596, 0.004);
+    EXPECT_NEAR(library.internal_transmittance(Library::slab_of({.f0 = glm::vec3(0.04f)})).x, 1.0 - 0.596, 0.004);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ namespace {
 TEST(Medium, AlbedoInversionGoesThereAndBack) {
     Library library;
     for (int i = 0; i <= 1000; ++i) {
-        const double albedo = i / 1000.0, similarity = library.medium_similarity(albedo);
+        const double albedo = i / 1000.0, similarity = library.medium_similarity(albedo, 1.0 - albedo);
         EXPECT_NEAR(library.medium_albedo(similarity), albedo, 2e-5);
         EXPECT_NEAR(1.0 - library.medium_dissimilarity(albedo), similarity, 1e-6);
         for (const double g : {-0.9, 0.0, 0.9}) {
@@ -20,7 +20,7 @@ TEST(Medium, AlbedoInversionGoesThereAndBack) {
             EXPECT_NEAR(std::sqrt((1.0 - single) / (1.0 - single * g)), similarity, 1e-9);
         }
     }
-    EXPECT_EQ(library.medium_similarity(1.0), 0.0) << "the fit passes 0 by 5e-6";
+    EXPECT_EQ(library.medium_similarity(1.0, 1.0 - 1.0), 0.0) << "the fit passes 0 by 5e-6";
 }
 
 TEST(Medium, MeanFreePathAndTransmittanceGoThereAndBack) {

@@ -50,7 +50,8 @@ void main() {
     vec3 sum = vec3(0.0);
     for (uint index = 0u; index < header.closure_count; ++index) {
         StoredClosure closure = read_stored_closure(header, index, roughness, subsurface);
-        ClosureValue value = evaluate_closure(prepare_closure(closure.slab, view, 1e-3), light);
+        ClosureValue value = evaluate_closure(cover_closure(prepare_closure(closure.slab, view, 1e-3), closure.path.spread,
+                                                            closure.path.under_interface), light);
         sum += (value.specular + value.diffuse + value.subsurface) * closure.path.weight *
                top_transmittance(closure.path, light.z);
     }
@@ -123,7 +124,8 @@ class StorageShaderTest : public testing::TestWithParam<const char*> {
             glm::dvec3 sum(0.0);
             for (const UnpackedClosure& closure : read->closures) {
                 const Library::ClosureValue value =
-                    library.evaluate_closure(library.prepare_closure(closure.slab, view, 1e-3), light);
+                    library.evaluate_closure(library.cover_closure(library.prepare_closure(closure.slab, view, 1e-3), closure.path.spread,
+                                                                        closure.path.under_interface), light);
                 sum += (value.specular + value.diffuse + value.subsurface) * closure.path.weight *
                        library.top_transmittance(closure.path, light.z);
             }

@@ -113,12 +113,12 @@ TEST(MediumTable, BetweenEntriesTheErrorIsSmall) {
     double reflected = 0.0, through = 0.0;
     for (int i = 0; i < 150; ++i) {
         const double albedo = i % 3 == 0 ? 1.0 : random(), cosine = std::max(random(), 0.02);
-        const double similarity = library.medium_similarity(albedo);
+        const double similarity = library.medium_similarity(albedo, 1.0 - albedo);
         ScatteringLayer layer(1.0 - similarity * similarity, {cosine});
         layer.start(std::exp2(random(-31.0, -30.0)));
         const double depth = std::exp2(random(-8.0, 8.0));
         while (layer.depth() < depth) layer.twice();
-        const auto scattering = library.medium_scattering(albedo, layer.depth(), 0.0, cosine);
+        const auto scattering = library.medium_scattering(albedo, 1.0 - albedo, layer.depth(), 0.0, cosine);
         // The table's own share, without the turn towards the authored albedo that opaque media take.
         const auto infinite = library.medium_table({std::sqrt(cosine), 1.0, std::sqrt(similarity)});
         const double turn =

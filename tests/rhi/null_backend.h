@@ -38,7 +38,7 @@ inline rhi::Capabilities full_capabilities() {
     c.storage_in_vertex = c.storage_in_fragment = c.dual_source_blending = c.independent_blend = true;
     c.descriptor_indexing = c.anisotropic_filtering = c.border_color = c.depth_clamp = c.depth_bias_clamp = true;
     c.wireframe = c.cube_arrays = c.multi_draw_indirect = c.indirect_first_instance = c.timestamps = true;
-    c.ray_query = true;
+    c.ray_query = c.texel_buffers = true;
     c.precise_occlusion = c.block_compression = c.float_color_targets = c.base_instance = c.texture_views =
         c.texture_view_formats = true;
     c.max_texture_1d = c.max_texture_2d = c.max_texture_cube = 16384;
@@ -50,6 +50,8 @@ inline rhi::Capabilities full_capabilities() {
     c.max_uniform_buffer_range = 65536;
     c.max_storage_buffer_range = std::uint64_t{1} << 27;
     c.max_buffer_size = std::uint64_t{1} << 31;
+    c.texel_buffer_offset_alignment = 16;
+    c.max_texel_buffer_elements = 65536;
     c.max_vertex_attributes = 16;
     c.max_vertex_buffers = 16;
     c.max_vertex_stride = 2048;
@@ -74,7 +76,8 @@ inline rhi::Capabilities full_capabilities() {
         } else if (format.is_depth_stencil()) {
             support = sampled | filtered | depth_target | multisampled;
         } else {
-            support = sampled | color_target | storage_image | vertex | multisampled;
+            support = sampled | color_target | storage_image | vertex | multisampled | uniform_texel_buffer |
+                      storage_texel_buffer;
             if (!format.is_integer()) support |= filtered | blended;
         }
     }

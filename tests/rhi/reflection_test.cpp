@@ -79,6 +79,42 @@ TEST(Reflection, ListsEveryKindOfBinding) {
     EXPECT_EQ(find(reflection, 2, 2)->dimension, ViewDimension::d2_array);
 }
 
+TEST(Reflection, KnowsTexelBuffers) {
+    const ShaderReflection reflection = reflect_text("texels.comp", R"(
+        #extension GL_EXT_samplerless_texture_functions : require
+        layout(local_size_x = 1) in;
+        layout(set = 0, binding = 0) uniform samplerBuffer floats;
+        layout(set = 0, binding = 1) uniform usamplerBuffer words[3];
+        layout(set = 0, binding = 2) uniform itextureBuffer whole_numbers;
+        layout(set = 1, binding = 0, r32ui) uniform uimageBuffer both;
+        layout(set = 1, binding = 1, rgba16f) uniform readonly imageBuffer read;
+        layout(set = 1, binding = 2) uniform writeonly iimageBuffer written;
+        void main() {
+            imageStore(written, 0, texelFetch(whole_numbers, 1) + ivec4(texelFetch(floats, 2) + imageLoad(read, 3)));
+            imageAtomicAdd(both, 4, 5u);
+        })");
+    const ReflectedBinding& floats = *find(reflection, 0, 0);
+    EXPECT_EQ(floats.type, BindingType::uniform_texel_buffer);
+    EXPECT_EQ(floats.sampled_kind, FormatKind::floating);
+    EXPECT_EQ(floats.dimension, ViewDimension::automatic);
+    EXPECT_EQ(floats.image_format, Format::undefined);
+    EXPECT_TRUE(floats.used);
+    EXPECT_EQ(find(reflection, 0, 1)->type, BindingType::uniform_texel_buffer);
+    EXPECT_EQ(find(reflection, 0, 1)->sampled_kind, FormatKind::uint);
+    EXPECT_EQ(find(reflection, 0, 1)->count, 3u);
+    EXPECT_FALSE(find(reflection, 0, 1)->used);
+    EXPECT_EQ(find(reflection, 0, 2)->type, BindingType::uniform_texel_buffer);
+    EXPECT_EQ(find(reflection, 0, 2)->sampled_kind, FormatKind::sint);
+    EXPECT_EQ(find(reflection, 1, 0)->type, BindingType::storage_texel_buffer);
+    EXPECT_EQ(find(reflection, 1, 0)->image_format, Format::r32_uint);
+    EXPECT_EQ(find(reflection, 1, 1)->type, BindingType::readonly_storage_texel_buffer);
+    EXPECT_EQ(find(reflection, 1, 1)->image_format, Format::rgba16_float);
+    EXPECT_EQ(find(reflection, 1, 2)->type, BindingType::writeonly_storage_texel_buffer);
+    EXPECT_EQ(find(reflection, 1, 2)->image_format, Format::undefined);
+    EXPECT_THAT(reflection.capabilities, Contains("SampledBuffer"));
+    EXPECT_THAT(reflection.capabilities, Contains("ImageBuffer"));
+}
+
 TEST(Reflection, KnowsUnboundedArrays) {
     const ShaderReflection reflection = reflect_text("bindless.frag", R"(
         #extension GL_EXT_nonuniform_qualifier : require

@@ -194,12 +194,11 @@ TEST(SpirvDamage, CapabilitiesThatNoBackendHas) {
 }
 
 TEST(SpirvDamage, ResourcesThatCannotBeBound) {
-    const ShaderDesc texel_buffer = test::compile_text("texel.comp", R"(
-        layout(local_size_x = 1) in;
-        layout(set = 0, binding = 0) buffer Words { uint words[]; };
-        layout(set = 0, binding = 1) uniform usamplerBuffer texels;
-        void main() { words[0] = texelFetch(texels, 0).x; })");
-    const auto result = try_reflect(texel_buffer.spirv);
+    const ShaderDesc input_attachment = test::compile_text("attachment.frag", R"(
+        layout(input_attachment_index = 0, set = 0, binding = 1) uniform subpassInput attachment;
+        layout(location = 0) out vec4 color;
+        void main() { color = subpassLoad(attachment); })");
+    const auto result = try_reflect(input_attachment.spirv, ShaderStage::fragment);
     ASSERT_FALSE(result);
     EXPECT_EQ(result.error().code, ErrorCode::unsupported);
 }

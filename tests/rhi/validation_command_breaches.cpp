@@ -34,6 +34,16 @@ CommandList pass_with_input(Bench& bench, bool per_instance = false) {
     return list;
 }
 
+void dispatch_texels(Bench& b, Format fetched, Format stored) {
+    constexpr BufferUsage texels = BufferUsage::uniform_texel | BufferUsage::storage_texel;
+    const ComputePipeline p = b.compute(texel_shader);
+    CommandList l = b.list();
+    l.set_pipeline(p);
+    l.set_bind_group(0, b.group(p, {{.binding = 0, .buffer = b.buffer(texels), .format = fetched},
+                                    {.binding = 1, .buffer = b.buffer(texels), .format = stored}}));
+    l.dispatch({});
+}
+
 }  // namespace
 
 std::vector<Breach> pass_breaches() {
@@ -337,6 +347,9 @@ std::vector<Breach> draw_breaches() {
                                   {.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest})}}));
              l.dispatch({});
          }},
+        {"N-546", [](Bench& b) { dispatch_texels(b, Format::rgba8_unorm, Format::r32_uint); }},
+        {"N-546", [](Bench& b) { dispatch_texels(b, Format::rgba8_sint, Format::r32_uint); }},
+        {"N-546", [](Bench& b) { dispatch_texels(b, Format::rg16_uint, Format::rg16_uint); }},
         {"N-547",
          [](Bench& b) {
              const ComputePipeline p = b.compute(storage_shader);

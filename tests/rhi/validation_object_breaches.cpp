@@ -31,6 +31,11 @@ void group_with(Bench& bench, BindingType type, std::vector<BindGroupEntry> entr
                                             .entries = std::move(entries),
                                             .name = "the group"});
 }
+/// `entry` with a buffer of 256 bytes that has both usages.
+void texels_with(Bench& bench, BindingType type, BindGroupEntry entry) {
+    entry.buffer = bench.buffer(BufferUsage::uniform_texel | BufferUsage::storage_texel);
+    group_with(bench, type, {entry});
+}
 
 }  // namespace
 
@@ -111,6 +116,12 @@ std::vector<Breach> resource_breaches() {
          [](Bench& b) {
              (void)b.device().create_buffer({16, storage, MemoryKind::upload, "the buffer"});
          }},
+        {"N-202",
+         [](Bench& b) {
+             (void)b.device().create_buffer({16, BufferUsage::storage_texel, MemoryKind::upload, "the buffer"});
+         }},
+        {"N-202", [](Bench& b) { (void)b.device().create_buffer({16, BufferUsage::uniform_texel}); },
+         [](Capabilities& c) { c.texel_buffers = false; }},
         {"N-210", [](Bench& b) { texture_with(b, [](TextureDesc& d) { d.format = undefined; }); }},
         {"N-210", [](Bench& b) { texture_with(b, [](TextureDesc& d) { d.format = rgb32_float; }); }},
         {"N-211", [](Bench& b) { texture_with(b, [](TextureDesc& d) { d.width = 0; }); }},
@@ -267,6 +278,8 @@ std::vector<Breach> group_breaches() {
          [](Bench& b) {
              layout_with(b, {{5000, sampler, 1, ShaderStage::fragment}});
          }},
+        {"N-306", [](Bench& b) { layout_with(b, {{0, uniform_texel_buffer, 1, ShaderStage::fragment}}); },
+         [](Capabilities& c) { c.texel_buffers = false; }},
         {"N-310",
          [](Bench& b) { group_with(b, uniform_buffer, {{.binding = 3, .buffer = b.buffer(BufferUsage::uniform)}}); }},
         {"N-311",
@@ -335,6 +348,35 @@ std::vector<Breach> group_breaches() {
              view.mip_count = 2;
              group_with(b, storage_image, {{.binding = 0, .texture = view}});
          }},
+        {"N-314",
+         [](Bench& b) {
+             group_with(b, uniform_texel_buffer,
+                        {{.binding = 0, .buffer = b.buffer(BufferUsage::storage_texel), .format = r32_uint}});
+         }},
+        {"N-314",
+         [](Bench& b) {
+             group_with(b, storage_texel_buffer,
+                        {{.binding = 0, .buffer = b.buffer(BufferUsage::uniform_texel | storage), .format = r32_uint}});
+         }},
+        {"N-317",
+         [](Bench& b) {
+             texels_with(b, uniform_texel_buffer, {.offset = 4, .format = r32_uint});
+         }},
+        {"N-318",
+         [](Bench& b) {
+             const Buffer large = b.buffer(BufferUsage::uniform_texel, 65537);
+             group_with(b, uniform_texel_buffer, {{.binding = 0, .buffer = large, .format = r8_uint}});
+         }},
+        {"N-323", [](Bench& b) { texels_with(b, uniform_texel_buffer, {}); }},
+        {"N-323", [](Bench& b) { texels_with(b, storage_texel_buffer, {.format = bc1_rgba_unorm}); }},
+        {"N-323",
+         [](Bench& b) { texels_with(b, readonly_storage_texel_buffer, {.format = r16_snorm}); },
+         [](Capabilities& c) {
+             c.formats[static_cast<std::uint32_t>(r16_snorm)] = FormatSupport::uniform_texel_buffer;
+         }},
+        {"N-324", [](Bench& b) { texels_with(b, writeonly_storage_texel_buffer, {.size = 30, .format = r32_uint}); }},
+        {"N-324",
+         [](Bench& b) { texels_with(b, uniform_texel_buffer, {.offset = 240, .size = 8, .format = rgba32_float}); }},
     };
 }
 
@@ -353,6 +395,16 @@ std::vector<Breach> pipeline_breaches() {
                                  "#extension GL_ARB_gpu_shader_fp64 : enable\nlayout(local_size_x = 1) in; layout(set "
                                  "= 0, binding = 0) buffer R { double r; }; void main() { r = r * 2.0lf; }"));
          }},
+        {"N-402",
+         [](Bench& b) { (void)b.device().create_shader(Bench::compiled("comp", texel_shader)); },
+         [](Capabilities& c) { c.texel_buffers = false; }},
+        {"N-403",
+         [](Bench& b) {
+             (void)b.device().create_shader(Bench::compiled(
+                 "frag", "layout(set = 0, binding = 0, r32ui) uniform uimageBuffer r; void main() { imageStore(r, 0, "
+                         "uvec4(1)); }"));
+         },
+         [](Capabilities& c) { c.storage_in_fragment = false; }},
         {"N-403",
          [](Bench& b) {
              (void)b.device().create_shader(Bench::compiled(

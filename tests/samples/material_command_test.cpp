@@ -52,6 +52,18 @@ TEST(MaterialCommand, BudgetAndFullDecideHowFarItGoes) {
     EXPECT_FALSE(closures({"--budget", "4"})["fits"]);
 }
 
+TEST(MaterialCommand, ComparesWithARandomWalk) {
+    const CommandResult result = run_nacre({"material", "gold", "--reference", "--json", "-"});
+    ASSERT_EQ(result.exit_code, 0) << result.errors;
+    const json reference = json::parse(result.output)["reference"];
+    // A slab alone is what the walk ends on: nothing but chance is between the two.
+    EXPECT_LT(reference["albedo_error"], 2e-3);
+    EXPECT_LT(reference["image_error"], 0.04);
+    ASSERT_EQ(reference["albedos"].size(), 6u);
+    EXPECT_NEAR(reference["albedos"][0]["walk"][0], 1.0, 0.01) << "gold's red";
+    EXPECT_TRUE(json::parse(run_nacre({"material", "gold", "--json", "-"}).output)["reference"].is_null());
+}
+
 TEST(MaterialCommand, DrawsAPicture) {
     const TemporaryFolder folder;
     const std::string file = (folder.path() / "m.png").string();

@@ -194,6 +194,8 @@ std::uint32_t memory(RunningInvocations* running, const CheckSite* site, const D
         Accessed at;
         if (access & access_workgroup)
             at.memory = workgroup_object(checks, static_cast<const WorkgroupRange*>(running->work)->memory);
+        else if (access & access_vertex)
+            at.memory = checks.vertex_buffers[static_cast<std::size_t>(site->binding)];
         else
             at.memory = const_cast<CheckedMemory*>(object_of(checks, *running, site->set, descriptors[lane]));
         if (!at.memory) continue;

@@ -19,6 +19,7 @@ class CommandChecks {
     std::uint32_t scope = 0;  ///< Of races: dispatches and render pass have numbers of their own, from 1.
     std::string command;      ///< "dispatch 2 of list 'frame', pass 'lighting'"
     std::array<const CheckedObjects*, max_groups> objects{};
+    std::array<CheckedMemory*, max_vertex_buffers> vertex_buffers{};  ///< Null where nothing is bound.
     std::span<CheckedMemory* const> workgroup_memories;  ///< One for each thread; null entries are allowed.
     std::atomic<std::uint64_t>* batches = nullptr;       ///< Counts the batches of a scope.
     ExecutionState* state = nullptr;

@@ -50,6 +50,7 @@ enum MemoryAccess : std::uint32_t {
     access_atomic = 4,
     access_shared = 8,      ///< Others may write there meanwhile: races are looked for.
     access_workgroup = 16,  ///< Memory of the workgroup; no descriptors.
+    access_vertex = 32,     ///< The vertex buffer whose number is the site's binding; no descriptors.
 };
 
 /// Beside ImageFlags: invocations agree on their own who uses a texel when.

@@ -84,11 +84,12 @@ class OrcGenerator final : public CodeGenerator {
         for (const auto& feature : llvm::sys::getHostCPUFeatures()) {
             if (!features.empty()) features += ',';
             features += (feature.getValue() ? "+" : "-") + feature.getKey().str();
-            if (feature.getKey() == "f16c" && feature.getValue()) has_half_ = true;
+            if (feature.getKey() == "f16c" && feature.getValue()) math_options_.half_instructions = true;
+            if (feature.getKey() == "avx512vl" && feature.getValue()) math_options_.exponent_instructions = contract;
         }
         cpu_ = llvm::sys::getHostCPUName().str();
         features_ = features;
-        contract_ = contract;
+        math_options_.contract = contract;
         triple_ = llvm::sys::getProcessTriple();
         auto machine = make_machine(llvm::CodeGenOptLevel::Less);
         if (!machine) return std::unexpected(failed("CPU backend", "LLVM knows no target for " + triple_));
@@ -167,7 +168,7 @@ class OrcGenerator final : public CodeGenerator {
     }
 
     const std::string& fingerprint() const override { return fingerprint_; }
-    bool has_half_instructions() const override { return has_half_; }
+    const MathOptions& math_options() const override { return math_options_; }
 
   private:
     /// Instructions of a module up to which its code is worth the time that good code takes.
@@ -210,7 +211,7 @@ class OrcGenerator final : public CodeGenerator {
         const llvm::Target* target = llvm::TargetRegistry::lookupTarget(triple_, error);
         if (!target) return nullptr;
         llvm::TargetOptions options;
-        options.AllowFPOpFusion = contract_ ? llvm::FPOpFusion::Standard : llvm::FPOpFusion::Strict;
+        options.AllowFPOpFusion = math_options_.contract ? llvm::FPOpFusion::Standard : llvm::FPOpFusion::Strict;
         return std::unique_ptr<llvm::TargetMachine>(target->createTargetMachine(triple_, cpu_, features_, options, llvm::Reloc::PIC_, llvm::CodeModel::Small,
                                                                                 level, true));
     }
@@ -328,7 +329,7 @@ class OrcGenerator final : public CodeGenerator {
     std::string triple_, cpu_, features_, fingerprint_;
     llvm::DataLayout layout_{""};
     std::uint32_t lanes_ = 16;
-    bool contract_ = false, has_half_ = false;
+    MathOptions math_options_;
     std::atomic<std::uint64_t> counter_{0};
 };
 

@@ -8,6 +8,7 @@
 
 #include <llvm/IR/Module.h>
 
+#include "backends/cpu/compiler/math/math.h"
 #include "backends/cpu/program.h"
 #include "core/error.h"
 
@@ -42,8 +43,8 @@ class CodeGenerator {
     virtual Expected<std::shared_ptr<LoadedCode>> load(std::vector<std::byte> object, const std::string& name) = 0;
     /// Whatever the translation depends on besides the module: processor, features, versions.
     [[nodiscard]] virtual const std::string& fingerprint() const = 0;
-    /// The processor converts half precision by instructions.
-    [[nodiscard]] virtual bool has_half_instructions() const = 0;
+    /// What the processor does by instructions, and what the generator was made for.
+    [[nodiscard]] virtual const MathOptions& math_options() const = 0;
 };
 
 }  // namespace nacre::cpu

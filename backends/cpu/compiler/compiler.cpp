@@ -53,7 +53,7 @@ class ShaderCompilation final : public Compiler {
         std::vector<NarrowedOperation> narrowed;
         NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Vertex, input, narrowed,
                                 [&](llvm::Module& target, const Module& module) {
-                                    VertexEmitter emitter(target, module, all_.options, source.slots, input);
+                                    VertexEmitter emitter(target, module, all_.options, all_.generator->math_options(), source.slots, input);
                                     emitter.emit();
                                     program = emitter.program;
                                     return Emitted{false, emitter.narrowed()};
@@ -73,7 +73,7 @@ class ShaderCompilation final : public Compiler {
         std::vector<NarrowedOperation> narrowed;
         NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Fragment, {}, narrowed,
                                 [&](llvm::Module& target, const Module& module) {
-                                    FragmentEmitter emitter(target, module, all_.options, source.slots);
+                                    FragmentEmitter emitter(target, module, all_.options, all_.generator->math_options(), source.slots);
                                     emitter.trace_table = source.trace;
                                     emitter.emit();
                                     program = emitter.program;
@@ -103,7 +103,7 @@ class ShaderCompilation final : public Compiler {
         std::vector<NarrowedOperation> narrowed;
         NACRE_TRY(program.code, compile(how, source, spv::ExecutionModel::GLCompute, {}, narrowed,
                                         [&](llvm::Module& target, const Module& module) {
-                                            ComputeEmitter emitter(target, module, how.options, source.slots);
+                                            ComputeEmitter emitter(target, module, how.options, how.generator->math_options(), source.slots);
                                             emitter.trace_table = source.trace;
                                             emitter.emit();
                                             program.workgroup_size = module.workgroup_size;

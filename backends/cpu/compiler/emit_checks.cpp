@@ -353,7 +353,8 @@ void Emitter::check_range(const Pointer& pointer) {
                             v[0], llvm::ConstantInt::getSigned(v[0]->getType(), pointer.offset + bytes - 1));
                     })
             : Component(int64(pointer.offset + bytes - 1));
-    check_fault(ShaderFault::index_range, bad, pointer.path + ", counted in bytes", last, pointer.limit, &pointer);
+    const std::string object = (pointer.path.empty() ? "a buffer" : pointer.path) + ", counted in bytes";
+    check_fault(ShaderFault::index_range, bad, object, last, pointer.limit, &pointer);
 }
 
 void Emitter::check_quads() {
@@ -503,22 +504,36 @@ llvm::Value* Emitter::check_memory(const Pointer& pointer, std::int64_t extra, c
     const std::uint32_t bytes = scalar.kind == TypeKind::boolean ? 4 : scalar.bits / 8;
     const Component ok = allowed(pointer, extra, bytes);
     llvm::Value* lanes_on = both(effect_mask(), ok ? ok.value : nullptr);
+    return call_check_memory(check_site(pointer.path, set, binding), pointer.descriptor_address.value,
+                             addresses(pointer, extra), bytes, access, lanes_on, undefined);
+}
+
+llvm::Value* Emitter::check_vertex_memory(const std::string& object, std::uint32_t buffer, llvm::Value* addresses,
+                                          std::uint32_t bytes, llvm::Value* lanes_on) {
+    return call_check_memory(check_site(object, -1, static_cast<std::int32_t>(buffer)), nullptr, addresses, bytes,
+                             access_read | access_vertex, lanes_on, nullptr);
+}
+
+llvm::Value* Emitter::call_check_memory(llvm::Value* site, llvm::Value* descriptors, llvm::Value* addresses,
+                                        std::uint32_t bytes, std::uint32_t access, llvm::Value* lanes_on,
+                                        llvm::Value* undefined) {
+    CheckNotes& all = notes();
     const auto put = [&](llvm::Value* value, llvm::AllocaInst*& slot) -> llvm::Value* {
+        if (!value) return llvm::ConstantPointerNull::get(pointer_type);
         if (!slot) slot = make_slot(llvm::ArrayType::get(pointer_type, max_lanes), "checked");
         builder.CreateAlignedStore(value->getType()->isVectorTy() ? value : splat(value), slot, llvm::Align(8));
         return slot;
     };
-    llvm::Value* addresses_at = put(addresses(pointer, extra), all.addresses);
-    llvm::Value* descriptors_at = pointer.descriptor_address ? put(pointer.descriptor_address.value, all.descriptors)
-                                                             : llvm::ConstantPointerNull::get(pointer_type);
+    llvm::Value* addresses_at = put(addresses, all.addresses);
+    llvm::Value* descriptors_at = put(descriptors, all.descriptors);
     llvm::Value* undefined_bits = int32(0);
     if (undefined) undefined_bits = mask_bits(undefined->getType()->isVectorTy() ? undefined : splat(undefined));
     llvm::Type* word = builder.getInt32Ty();
-    llvm::Value* bits = builder.CreateCall(
-        external("nacre_cpu_check_memory", word,
-                 {pointer_type, pointer_type, pointer_type, pointer_type, word, word, word, word}),
-        {all.running, check_site(pointer.path, set, binding), descriptors_at, addresses_at, int32(bytes),
-         int32(static_cast<std::int32_t>(access)), mask_bits(lanes_on), undefined_bits});
+    llvm::Value* bits =
+        builder.CreateCall(external("nacre_cpu_check_memory", word,
+                                    {pointer_type, pointer_type, pointer_type, pointer_type, word, word, word, word}),
+                           {all.running, site, descriptors_at, addresses_at, int32(bytes),
+                            int32(static_cast<std::int32_t>(access)), mask_bits(lanes_on), undefined_bits});
     return builder.CreateBitCast(builder.CreateTrunc(bits, builder.getIntNTy(lanes)), mask_type);
 }
 

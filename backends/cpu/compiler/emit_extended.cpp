@@ -271,7 +271,9 @@ bool Emitter::emit_extended(const Instruction& at) {
         }
         case GLSLstd450Normalize: {
             const Value x = argument(0);
-            if (x.components.size() == 1) return map1([&](auto* v) { return math.sign(v); });
+            // NaN has no sign, and stays.
+            if (x.components.size() == 1)
+                return map1([&](auto* v) { return select(builder.CreateFCmpUNO(v, v), v, math.sign(v)); });
             const Component scale = apply({dot(x.components, x.components)}, [&](Values v) { return math.inverse_sqrt(v[0]); });
             std::vector<Component> made;
             for (const Component& component : x.components) made.push_back(f_multiply(component, scale));

@@ -243,12 +243,12 @@ bool Emitter::emit_image(const Instruction& at) {
     const Value image = get(at.operand(0));
     image_root = image.image_root;
     const Type& type = module.type(image.image_type);
-    if (type.dim == spv::Dim::Buffer || type.dim == spv::Dim::SubpassData)
-        reject("texel buffers and subpass inputs are not supported");
+    if (type.dim == spv::Dim::SubpassData) reject("subpass inputs are not supported");
     std::vector<Component> coordinates = get(at.operand(1)).components;
     if (operation == ImageOperation::store && trace_table) {
         trace(at, 0, {at.operand(2)}, get(at.operand(2)).components);
-        trace_image_write(coordinates);
+        // Which invocation wrote a texel is asked of textures alone.
+        if (type.dim != spv::Dim::Buffer) trace_image_write(coordinates);
     }
     if (in_double() && image_integer_flag(image.image_type) == 0) {
         emit_double_image(at, {operation, is_projected, is_compared, is_implicit, first_operand});
@@ -306,7 +306,12 @@ bool Emitter::emit_image(const Instruction& at) {
     }
     if (is_compared) {
         flags |= image_compare;
-        put_argument(offsetof(ImageArguments, reference), to_float(get_scalar(at.operand(2))));
+        Component reference = to_float(get_scalar(at.operand(2)));
+        // The reference is projected like the coordinates (Vulkan specification, "Projection Operation").
+        if (is_projected)
+            reference = apply({reference, coordinates.at(dimensions)},
+                              [&](auto v) { return builder.CreateFDiv(v[0], v[1]); });
+        put_argument(offsetof(ImageArguments, reference), reference);
     }
     if (operation == ImageOperation::gather && !is_compared)
         flags |= (module.constant_word(at.operand(2)).value_or(0) & 3) << image_component_shift;
@@ -404,7 +409,11 @@ void Emitter::emit_double_image(const Instruction& at, const ImageAccess& access
         put(offsetof(DoubleImageArguments, lod), more.lod ? get_scalar(more.lod) : Component(int32(0)), real);
     if (access.is_compared) {
         flags |= image_compare;
-        put(offsetof(DoubleImageArguments, reference), get_scalar(at.operand(2)), real);
+        Component reference = get_scalar(at.operand(2));
+        if (access.is_projected)
+            reference = apply({reference, coordinates.components.at(dimensions)},
+                              [&](auto v) { return builder.CreateFDiv(v[0], v[1]); });
+        put(offsetof(DoubleImageArguments, reference), reference, real);
     } else if (operation == ImageOperation::gather) {
         flags |= (module.constant_word(at.operand(2)).value_or(0) & 3) << image_component_shift;
     }

@@ -74,6 +74,7 @@ bool Emitter::emit_subgroup(const Instruction& at) {
     };
     const auto lane_of = [&](Id id) {
         const Component lane = get_scalar(id);
+        if (follows_undefined()) check_undefined(std::span(&lane, 1), origin_of(id));
         if (!lane.value->getType()->getScalarType()->isIntegerTy() || lane.value->getType()->getScalarType()->isIntegerTy(1))
             reject("the number of an invocation is no integer");
         return lane;
@@ -93,6 +94,22 @@ bool Emitter::emit_subgroup(const Instruction& at) {
         return Component(builder.CreateExtractElement(value.value, inside));
     };
 
+    // What of a value nothing has written, lane by lane. Null: all of it was written.
+    const auto undefined_in = [&](const Component& value) -> llvm::Value* {
+        if (!value.undefined) return nullptr;
+        return value.undefined->getType()->isVectorTy() ? value.undefined : splat(value.undefined);
+    };
+    // A result that depends on the values of all lanes.
+    const auto of_all = [&](std::vector<Component> result, std::span<const Component> values) {
+        llvm::Value* undefined = nullptr;
+        for (const Component& value : values)
+            if (llvm::Value* more = undefined_in(value))
+                undefined = undefined ? builder.CreateOr(undefined, more) : more;
+        if (undefined) undefined = any(both(mask, undefined));
+        for (Component& component : result) component.undefined = undefined;
+        return result;
+    };
+
     switch (at.op) {
         case Op::OpGroupNonUniformElect: {
             llvm::Value* lowest = first_lane(mask);
@@ -102,32 +119,43 @@ bool Emitter::emit_subgroup(const Instruction& at) {
         case Op::OpGroupNonUniformAll: case Op::OpSubgroupAllKHR: {
             const Component condition = condition_of(at.operand(at.op == Op::OpSubgroupAllKHR ? 0 : 1));
             if (condition.is_uniform()) set(at, {condition});
-            else set(at, {Component(builder.CreateNot(any(both(mask, builder.CreateNot(condition.value)))))});
+            else
+                set(at, of_all({Component(builder.CreateNot(any(both(mask, builder.CreateNot(condition.value)))))},
+                               std::span(&condition, 1)));
             return true;
         }
         case Op::OpGroupNonUniformAny: case Op::OpSubgroupAnyKHR: {
             const Component condition = condition_of(at.operand(at.op == Op::OpSubgroupAnyKHR ? 0 : 1));
             if (condition.is_uniform()) set(at, {condition});
-            else set(at, {Component(any(condition_mask(condition)))});
+            else
+                set(at, of_all({Component(any(condition_mask(condition)))}, std::span(&condition, 1)));
             return true;
         }
         case Op::OpGroupNonUniformAllEqual: case Op::OpSubgroupAllEqualKHR: {
             const Value value = operand_value(at.op == Op::OpSubgroupAllEqualKHR ? 0 : 1);
             llvm::Value* equal = builder.getTrue();
             for (const Component& component : value.components) {
-                if (component.is_uniform()) continue;
+                if (component.is_uniform()) {
+                    // NaN is not equal to itself.
+                    if (component.value->getType()->isFloatingPointTy())
+                        equal = builder.CreateAnd(equal, builder.CreateFCmpORD(component.value, component.value));
+                    continue;
+                }
                 llvm::Value* first = splat(narrow(component, mask));
                 llvm::Value* same = first->getType()->isFPOrFPVectorTy() ? builder.CreateFCmpOEQ(component.value, first)
                                                                          : builder.CreateICmpEQ(component.value, first);
                 equal = builder.CreateAnd(equal, builder.CreateNot(any(both(mask, builder.CreateNot(same)))));
             }
-            set(at, {Component(equal)});
+            set(at, of_all({Component(equal)}, value.components));
             return true;
         }
         case Op::OpGroupNonUniformBroadcastFirst: case Op::OpSubgroupFirstInvocationKHR: {
             std::vector<Component> made;
-            for (const Component& component : operand_value(at.op == Op::OpSubgroupFirstInvocationKHR ? 0 : 1).components)
+            for (const Component& component :
+                 operand_value(at.op == Op::OpSubgroupFirstInvocationKHR ? 0 : 1).components) {
                 made.emplace_back(narrow(component, mask));
+                if (component.undefined) made.back().undefined = narrow(Component(component.undefined), mask);
+            }
             set(at, std::move(made));
             return true;
         }
@@ -135,17 +163,21 @@ bool Emitter::emit_subgroup(const Instruction& at) {
             const std::size_t first = at.op == Op::OpSubgroupReadInvocationKHR ? 0 : 1;
             llvm::Value* lane = narrow(lane_of(at.operand(first + 1)), mask);
             std::vector<Component> made;
-            for (const Component& component : operand_value(first).components) made.push_back(one_lane(component, lane));
+            for (const Component& component : operand_value(first).components) {
+                made.push_back(one_lane(component, lane));
+                if (component.undefined) made.back().undefined = one_lane(Component(component.undefined), lane).value;
+            }
             set(at, std::move(made));
             return true;
         }
         case Op::OpGroupNonUniformBallot: case Op::OpSubgroupBallotKHR: {
             const Component condition = condition_of(at.operand(at.op == Op::OpSubgroupBallotKHR ? 0 : 1));
-            set(at, ballot(condition_mask(condition)));
+            set(at, of_all(ballot(condition_mask(condition)), std::span(&condition, 1)));
             return true;
         }
         case Op::OpGroupNonUniformInverseBallot: {
-            set(at, {Component(lane_bit(narrow(ballot_of(at.operand(1)), mask)))});
+            const Component word = ballot_of(at.operand(1));
+            set(at, of_all({Component(lane_bit(narrow(word, mask)))}, std::span(&word, 1)));
             return true;
         }
         case Op::OpGroupNonUniformBallotBitExtract: {
@@ -166,7 +198,8 @@ bool Emitter::emit_subgroup(const Instruction& at) {
                 std::vector<std::uint32_t> below(lanes);
                 for (std::uint32_t i = 0; i < lanes; ++i)
                     below[i] = operation == spv::GroupOperation::InclusiveScan ? (2u << i) - 1 : (1u << i) - 1;
-                word = Component(builder.CreateAnd(widen(word), llvm::ConstantDataVector::get(context, below)));
+                word = apply({word, Component(llvm::ConstantDataVector::get(context, below))},
+                             [&](auto v) { return builder.CreateAnd(v[0], v[1]); });
             }
             set(at, {apply({word}, [&](auto v) { return math.bit_count(v[0]); })});
             return true;
@@ -209,8 +242,11 @@ bool Emitter::emit_subgroup(const Instruction& at) {
                 default: break;
             }
             std::vector<Component> made;
-            for (const Component& component : operand_value(1).components)
+            for (const Component& component : operand_value(1).components) {
                 made.push_back(component.is_uniform() ? Component(widen(component)) : Component(permute(component.value, source)));
+                if (llvm::Value* undefined = undefined_in(component))
+                    made.back().undefined = permute(undefined, source);
+            }
             set(at, std::move(made));
             return true;
         }
@@ -255,9 +291,11 @@ bool Emitter::emit_subgroup(const Instruction& at) {
     if (operation == spv::GroupOperation::ClusteredReduce)
         cluster = std::min(lanes, std::max(1u, module.constant_word(at.operand(3)).value_or(lanes)));
     std::vector<Component> made;
-    for (const Component& component : operand_value(2).components) {
-        llvm::Value* identity = splat(how.identity);
-        llvm::Value* values = select(mask, widen(component), identity);
+    const bool is_scan =
+        operation == spv::GroupOperation::InclusiveScan || operation == spv::GroupOperation::ExclusiveScan;
+    const auto combined = [&](llvm::Value* values, const Combination& by) {
+        llvm::Value* identity = splat(by.identity);
+        values = select(mask, values, identity);
         const auto moved_by = [&](llvm::Value* from, std::int32_t distance, bool exchange) {
             // Lanes from `distance` below (or exchanged with it); the identity where there is none.
             llvm::SmallVector<int, 16> source(lanes);
@@ -267,17 +305,18 @@ bool Emitter::emit_subgroup(const Instruction& at) {
             }
             return builder.CreateShuffleVector(from, identity, source);
         };
-        if (operation == spv::GroupOperation::InclusiveScan || operation == spv::GroupOperation::ExclusiveScan) {
-            for (std::uint32_t step = 1; step < lanes; step *= 2)
-                values = how.combine(moved_by(values, static_cast<std::int32_t>(step), false), values);
-            if (operation == spv::GroupOperation::ExclusiveScan) values = moved_by(values, 1, false);
-            made.emplace_back(values);
-        } else {
-            for (std::uint32_t step = 1; step < cluster; step *= 2)
-                values = how.combine(values, moved_by(values, static_cast<std::int32_t>(step), true));
-            made.push_back(operation == spv::GroupOperation::Reduce ? Component(builder.CreateExtractElement(values, std::uint64_t{0}))
-                                                                    : Component(values));
+        for (std::uint32_t step = 1; step < (is_scan ? lanes : cluster); step *= 2) {
+            llvm::Value* moved = moved_by(values, static_cast<std::int32_t>(step), !is_scan);
+            values = is_scan ? by.combine(moved, values) : by.combine(values, moved);
         }
+        if (operation == spv::GroupOperation::ExclusiveScan) values = moved_by(values, 1, false);
+        return operation == spv::GroupOperation::Reduce ? builder.CreateExtractElement(values, std::uint64_t{0})
+                                                        : values;
+    };
+    const Combination either{[&](auto* a, auto* b) { return builder.CreateOr(a, b); }, builder.getFalse()};
+    for (const Component& component : operand_value(2).components) {
+        made.emplace_back(combined(widen(component), how));
+        if (llvm::Value* undefined = undefined_in(component)) made.back().undefined = combined(undefined, either);
     }
     set(at, std::move(made));
     return true;

@@ -6,9 +6,10 @@
 
 namespace nacre::cpu {
 
-Emitter::Emitter(llvm::Module& into, const Module& from, const CompilerOptions& how, std::span<const BindingSlots> layout)
+Emitter::Emitter(llvm::Module& into, const Module& from, const CompilerOptions& how, const MathOptions& how_math,
+                 std::span<const BindingSlots> layout)
     : target(into), context(into.getContext()), module(from), options(how), slots(layout), lanes(how.lanes),
-      builder(into.getContext()), math(builder, how.mode == ExecutionMode::fast), uniformity(from),
+      builder(into.getContext()), math(builder, how_math), uniformity(from),
       mask_type(llvm::FixedVectorType::get(llvm::Type::getInt1Ty(into.getContext()), how.lanes)),
       pointer_type(llvm::PointerType::getUnqual(into.getContext())) {}
 

@@ -140,7 +140,8 @@ class SlotTable {
 
 class Emitter {
   public:
-    Emitter(llvm::Module& target, const Module& module, const CompilerOptions& options, std::span<const BindingSlots> slots);
+    Emitter(llvm::Module& target, const Module& module, const CompilerOptions& options, const MathOptions& math_options,
+            std::span<const BindingSlots> slots);
     virtual ~Emitter() = default;
     /// Set before the emission of a program that tells what it computes, and filled by it.
     TraceTable* trace_table = nullptr;
@@ -374,6 +375,12 @@ class Emitter {
     /// Takes note of an access to a scalar, by MemoryAccess; returns the lanes that read what is undefined, null: none can.
     llvm::Value* check_memory(const Pointer& pointer, std::int64_t extra, const Type& scalar, std::uint32_t access,
                               llvm::Value* undefined);
+    llvm::Value* call_check_memory(llvm::Value* site, llvm::Value* descriptors, llvm::Value* addresses,
+                                   std::uint32_t bytes, std::uint32_t access, llvm::Value* lanes_on,
+                                   llvm::Value* undefined);
+    /// The same for a read of bytes of a vertex buffer, of an address in each lane.
+    llvm::Value* check_vertex_memory(const std::string& object, std::uint32_t buffer, llvm::Value* addresses,
+                                     std::uint32_t bytes, llvm::Value* lanes_on);
     /// The same for the image operation whose arguments are in place.
     llvm::Value* check_image(llvm::Value* image, llvm::Value* sampler, std::uint32_t flags, llvm::Value* lanes_on);
     void check_barrier();

@@ -38,16 +38,17 @@ class ComputeEmitter final : public Emitter {
 
 class VertexEmitter final : public Emitter {
   public:
-    VertexEmitter(llvm::Module& into, const Module& from, const CompilerOptions& how, std::span<const BindingSlots> layout,
-                  const VertexInput& input)
-        : Emitter(into, from, how, layout), input_(input) {}
+    VertexEmitter(llvm::Module& into, const Module& from, const CompilerOptions& how, const MathOptions& how_math,
+                  std::span<const BindingSlots> layout, const VertexInput& input)
+        : Emitter(into, from, how, how_math, layout), input_(input) {}
     void emit();
     VertexProgram program;  ///< Everything but `run`, `name` and `code`.
     using Emitter::has_side_effects;
 
   private:
     std::vector<Component> input_components(const Variable& variable) override;
-    Component fetch(const rhi::VertexAttribute& attribute, std::uint32_t component, const Type& scalar);
+    Component fetch(const std::string& name, const rhi::VertexAttribute& attribute, std::uint32_t component,
+                    const Type& scalar);
     void emit_batch();
     void store_outputs();
     void add_stage_values(std::vector<llvm::Value**>& places) override;

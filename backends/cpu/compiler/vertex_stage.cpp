@@ -13,7 +13,8 @@ using rhi::FormatKind;
 using spv::BuiltIn;
 
 /// One component of an attribute, read from its buffer and converted as its format says.
-Component VertexEmitter::fetch(const rhi::VertexAttribute& attribute, std::uint32_t component, const Type& scalar) {
+Component VertexEmitter::fetch(const std::string& name, const rhi::VertexAttribute& attribute, std::uint32_t component,
+                               const Type& scalar) {
     const rhi::FormatInfo& format = rhi::info(attribute.format);
     const bool is_integer = scalar.kind == TypeKind::integer;
     llvm::Type* word = builder.getInt32Ty();
@@ -69,13 +70,25 @@ Component VertexEmitter::fetch(const rhi::VertexAttribute& attribute, std::uint3
     }
     const auto constant_word = [&](std::uint32_t value) { return llvm::ConstantInt::get(bits->getType(), value); };
     const auto float_type = [&]() { return like(bits, real_type()); };
+    llvm::Value* undefined = nullptr;
+    if (follows_undefined()) {
+        const bool is_packed = channel.bits % 8 != 0;
+        llvm::Value* first = at_offset(data, extra + (is_packed ? 0 : channel.shift / 8));
+        undefined = check_vertex_memory(name, attribute.buffer, builder.CreateGEP(builder.getInt8Ty(), first, begin),
+                                        is_packed ? 4 : channel.bits / 8, both(live(), fits));
+    }
+    const auto noted = [&](Component value) {
+        if (undefined) value.undefined = value.is_uniform() ? any(undefined) : undefined;
+        return value;
+    };
     const auto to_result = [&](llvm::Value* value) -> Component {
         llvm::Type* kind = scalar_type(scalar);
-        if (is_integer) {
-            llvm::Type* shaped = like(value, kind);
-            return Component(builder.CreateZExtOrTrunc(value, shaped));
-        }
-        return Component(value->getType()->getScalarType() == kind ? value : math.convert_float(value, kind));
+        Component result(value);
+        if (is_integer)
+            result = Component(builder.CreateZExtOrTrunc(value, like(value, kind)));
+        else if (value->getType()->getScalarType() != kind)
+            result = Component(math.convert_float(value, kind));
+        return noted(result);
     };
     const bool is_signed = format.kind == FormatKind::sint || format.kind == FormatKind::snorm;
     if (channel.bits < 32) {
@@ -95,7 +108,7 @@ Component VertexEmitter::fetch(const rhi::VertexAttribute& attribute, std::uint3
             if (is_integer) return to_result(bits);
             if (in_double()) {
                 const Component plain = from_word(Component(bits), real_type());
-                if (layout.stride % 4 != 0 || attribute.offset % 4 != 0) return plain;
+                if (layout.stride % 4 != 0 || attribute.offset % 4 != 0) return noted(plain);
                 // The word's double, where it stands for the word.
                 const std::size_t shadow_offset = binding + offsetof(VertexBufferBinding, shadow);
                 llvm::Value* shadow =
@@ -107,7 +120,7 @@ Component VertexEmitter::fetch(const rhi::VertexAttribute& attribute, std::uint3
                 const Component precise = builder.CreateMaskedGather(vector_of(real_type()), places, llvm::Align(8),
                                                                      is_fixed ? splat(fits) : fits, none);
                 llvm::Value* stands = builder.CreateICmpEQ(to_word(precise).value, widen(Component(bits)));
-                return Component(select(stands, precise.value, widen(plain)));
+                return noted(Component(select(stands, precise.value, widen(plain))));
             }
             return to_result(builder.CreateBitCast(bits, float_type()));
         case FormatKind::unorm:
@@ -148,7 +161,8 @@ std::vector<Component> VertexEmitter::input_components(const Variable& variable)
         if (at.is_wide) reject(fmt::format("input '{}' holds 64-bit values, of which no vertex format is made", variable.name));
         const auto attribute = std::ranges::find(input_.attributes, at.location, &rhi::VertexAttribute::location);
         if (attribute == input_.attributes.end()) made.push_back(zero(module.type(at.type)));
-        else made.push_back(fetch(*attribute, at.component, module.type(at.type)));
+        else
+            made.push_back(fetch(variable.name, *attribute, at.component, module.type(at.type)));
     }
     return made;
 }
@@ -170,20 +184,25 @@ void VertexEmitter::store_outputs() {
         std::vector<Component> values;
     };
     std::vector<BuiltInOutput> builtins;
+    const auto add_builtin = [&](const Variable& variable, BuiltIn builtin, const Pointer& place) {
+        builtins.push_back({builtin, load(place)});
+        // Other outputs may be undefined as long as no fragment depends on them.
+        if (options.checks) check_outputs(variable, builtins.back().values);
+    };
     for (const Id id : module.interface()) {
         const Variable* variable = module.variable(id);
         if (!variable || variable->storage != spv::StorageClass::Output) continue;
         const Type& type = module.type(variable->type);
         const Pointer pointer = pointer_to(id);
         if (variable->builtin) {
-            builtins.push_back({*variable->builtin, load(pointer)});
+            add_builtin(*variable, *variable->builtin, pointer);
         } else if (type.kind == TypeKind::structure && !type.members.empty() && type.members[0].builtin) {
             for (std::uint32_t i = 0; i < type.members.size(); ++i) {
                 if (!uses_member(module, id, i)) continue;
                 Pointer member = pointer;
                 member.component += type.members[i].first_component;
                 member.type = type.members[i].type;
-                builtins.push_back({*type.members[i].builtin, load(member)});
+                add_builtin(*variable, *type.members[i].builtin, member);
             }
         } else {
             const auto scalars = interface_scalars(module, *variable);

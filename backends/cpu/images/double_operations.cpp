@@ -220,7 +220,7 @@ class Lane {
                static_cast<std::uint64_t>(x / edge) * plan_.texel_bytes;
     }
     [[nodiscard]] double* shadow_at(const ImageLevel& level, std::uint64_t offset) const {
-        return level.shadow ? level.shadow + offset / plan_.texel_bytes * 4 : nullptr;
+        return level.shadow ? level.shadow + offset / plan_.texel_bytes * image_.shadow_doubles : nullptr;
     }
     [[nodiscard]] DoubleTexel texel(std::uint32_t number, std::int64_t x, std::int64_t y, std::int64_t slice,
                                     std::int64_t sample = 0) const {

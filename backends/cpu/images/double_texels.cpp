@@ -28,11 +28,18 @@ double in_range(double value, ChannelCoding coding) {
 
 void encode(rhi::Format format, const double* values, std::byte* out) {
     Texel texel{};
-    for (int c = 0; c < 4; ++c) texel.f[c] = static_cast<float>(values[c]);
+    for (std::uint32_t c = 0; c < format_plan(format).channel_count; ++c) texel.f[c] = static_cast<float>(values[c]);
     encode_texel(format, texel, out);
 }
 
 }  // namespace
+
+std::uint32_t float_words(rhi::Format format) {
+    const rhi::FormatInfo& facts = rhi::info(format);
+    const bool is_words =
+        facts.kind == rhi::FormatKind::floating && !facts.is_compressed() && facts.block_bytes == 4 * facts.channels;
+    return is_words ? facts.channels : 0;
+}
 
 bool has_shadow(rhi::Format format) {
     const rhi::FormatInfo& facts = rhi::info(format);
@@ -86,7 +93,7 @@ void store_double(rhi::Format format, const DoubleTexel& values, std::byte* texe
     for (std::size_t c = 0; c < plan.channel_count && c < 4; ++c)
         kept[c] = in_range(values[c], plan.channels[c].coding);
     encode(format, kept.data(), texel);
-    if (shadow) std::ranges::copy(kept, shadow);
+    if (shadow) std::copy_n(kept.data(), plan.channel_count, shadow);
 }
 
 }  // namespace nacre::cpu

@@ -18,6 +18,10 @@ namespace nacre::cpu {
 /// Channels as a shader sees them; those that the format lacks are 0, alpha 1.
 using DoubleTexel = std::array<double, 4>;
 
+/// Channels of formats whose texels are floats of 32 bits and nothing else, so that their doubles are those of the
+/// words of a buffer; 0 of other formats.
+std::uint32_t float_words(rhi::Format format);
+
 /// Whether textures of the format have doubles: all but integers, compressed and shared-exponent formats.
 bool has_shadow(rhi::Format format);
 
@@ -27,7 +31,8 @@ bool has_shadow(rhi::Format format);
 DoubleTexel decode_double(rhi::Format format, const std::byte* block, std::uint32_t x_in_block = 0,
                           std::uint32_t y_in_block = 0);
 
-/// The texel's doubles where they stand for its bits, else what the bits stand for. `shadow` may be null.
+/// The texel's doubles, one for each channel of the format, where they stand for its bits, else what the bits stand
+/// for. `shadow` may be null.
 DoubleTexel load_double(rhi::Format format, const std::byte* texel, const double* shadow);
 
 /// Stores the bits that `encode_texel` gives for the values rounded to float, and the values, in the range of the

@@ -16,6 +16,11 @@ struct DepthPlane {
     double c = 0.0, dx = 0.0, dy = 0.0;
 };
 
+/// Tiles, inclusive.
+struct TileBox {
+    std::int32_t left, right, top, bottom;
+};
+
 /// What depth bias counts in depths of fixed point; 0 for floats, where it depends on the depth.
 double fixed_unit(DepthLayout layout) {
     switch (layout) {
@@ -71,7 +76,18 @@ class Assembler {
     int gather_planes(const std::uint32_t* locals, int count, std::uint32_t codes, ClipPlane* planes) const;
     std::uint32_t vertex_between(const SetupVertex& a, const SetupVertex& b, double t);
     void add(const Corners& corners, const Source& source, std::uint32_t bits);
-    void bin(std::uint32_t record, std::int32_t left, std::int32_t right, std::int32_t top, std::int32_t bottom);
+    [[nodiscard]] std::uint32_t tile_at(std::int32_t x, std::int32_t y) const {
+        return static_cast<std::uint32_t>(y) * targets_.tiles_x + static_cast<std::uint32_t>(x);
+    }
+    /// @param box  of the tiles that it touches
+    void bin(std::uint32_t record, const TileBox& box) {
+        if (box.left == box.right && box.top == box.bottom)
+            scratch_.entries.push_back({tile_at(box.left, box.top), record});
+        else
+            bin_in_several(record, box);
+    }
+    void bin_in_several(std::uint32_t record, const TileBox& box);
+    void bin_where_inside(std::uint32_t record, const TileBox& box);
 
     Chunk& chunk_;
     const QueuedDraw& draw_;
@@ -140,21 +156,43 @@ bool Assembler::homogeneous_source(const SetupVertex (&vertices)[3], std::uint32
     return true;
 }
 
-/// @param left  of the tiles that it touches; right and so on, inclusive
-void Assembler::bin(std::uint32_t record, std::int32_t left, std::int32_t right, std::int32_t top,
-                    std::int32_t bottom) {
-    const auto across = static_cast<std::int32_t>(targets_.tiles_x);
-    if (left == right && top == bottom) {
-        scratch_.entries.push_back({static_cast<std::uint32_t>(top * across + left), record});
-        return;
-    }
-    if ((right - left + 1) * (bottom - top + 1) > most_binned_tiles) {
+void Assembler::bin_in_several(std::uint32_t record, const TileBox& box) {
+    const auto tiles = static_cast<std::size_t>(box.right - box.left + 1) * (box.bottom - box.top + 1);
+    const std::size_t room = most_binned_tiles * std::size_t{std::max(chunk_.primitive_count, least_bin_room)};
+    if (tiles > most_binned_tiles && scratch_.entries.size() + tiles > room) {
         chunk_.large.push_back(record);
         return;
     }
-    for (std::int32_t y = top; y <= bottom; ++y)
-        for (std::int32_t x = left; x <= right; ++x)
-            scratch_.entries.push_back({static_cast<std::uint32_t>(y * across + x), record});
+    if (box.left != box.right && box.top != box.bottom && (chunk_.records[record].bits & Record::thin_line) == 0) {
+        bin_where_inside(record, box);
+        return;
+    }
+    for (std::int32_t y = box.top; y <= box.bottom; ++y)
+        for (std::int32_t x = box.left; x <= box.right; ++x) scratch_.entries.push_back({tile_at(x, y), record});
+}
+
+/// Leaves out tiles that lie on the outer side of an edge of the triangle.
+void Assembler::bin_where_inside(std::uint32_t record, const TileBox& box) {
+    constexpr std::int64_t tile = std::int64_t{tile_size} * subpixels;
+    const Record& triangle = chunk_.records[record];
+    // Edge functions in the corner of the first tile where they are largest, and what they change by from tile to tile.
+    std::int64_t at[3], along_x[3], along_y[3];
+    for (int i = 0; i < 3; ++i) {
+        const int next = i == 2 ? 0 : i + 1;
+        const std::int64_t a = triangle.y[i] - triangle.y[next], b = triangle.x[next] - triangle.x[i];
+        at[i] = a * (tile * (box.left + (a > 0 ? 1 : 0)) - triangle.x[i]) +
+                b * (tile * (box.top + (b > 0 ? 1 : 0)) - triangle.y[i]);
+        along_x[i] = a * tile, along_y[i] = b * tile;
+    }
+    for (std::int32_t y = box.top; y <= box.bottom; ++y) {
+        std::int64_t in_row[3] = {at[0], at[1], at[2]};
+        for (std::int32_t x = box.left; x <= box.right; ++x) {
+            if ((in_row[0] | in_row[1] | in_row[2]) >= 0)
+                scratch_.entries.push_back({tile_at(x, y), record});
+            for (int i = 0; i < 3; ++i) in_row[i] += along_x[i];
+        }
+        for (int i = 0; i < 3; ++i) at[i] += along_y[i];
+    }
 }
 
 /// @param corners  clockwise
@@ -190,7 +228,7 @@ void Assembler::add(const Corners& corners, const Source& source, std::uint32_t 
     record.depth_c = bounded(source.depth.c), record.depth_dx = bounded(source.depth.dx);
     record.depth_dy = bounded(source.depth.dy);
     record.x0 = source.x0, record.y0 = source.y0;
-    bin(index, low_x / tile_size, high_x / tile_size, low_y / tile_size, high_y / tile_size);
+    bin(index, {low_x / tile_size, high_x / tile_size, low_y / tile_size, high_y / tile_size});
 }
 
 void Assembler::triangles(const Segment& segment, const Kernels& kernels) {
@@ -237,7 +275,7 @@ void Assembler::triangles(const Segment& segment, const Kernels& kernels) {
             }
             const auto index = static_cast<std::uint32_t>(chunk_.records.size());
             chunk_.records.push_back(work.records[i]);
-            bin(index, work.left[i], work.right[i], work.top[i], work.bottom[i]);
+            bin(index, {work.left[i], work.right[i], work.top[i], work.bottom[i]});
         }
     }
 }

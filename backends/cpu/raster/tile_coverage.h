@@ -44,7 +44,7 @@ struct SmallTriangles {
     alignas(64) std::int32_t along_x[3][16], along_y[3][16], at_tile[3][16], at_block[3][16];
     std::uint32_t small;  ///< One bit for each record. What is said of the others does not hold.
     std::uint32_t drawn;  ///< They have pixels that may be drawn.
-    std::uint32_t cut;    ///< Those are not all that they have.
+    std::uint32_t cut;    ///< Blocks of the tile hold others too.
 
     void prepare(const TileRun& run, const Record* const* records, std::uint32_t count) {
         alignas(64) std::int32_t words[8][16];
@@ -71,7 +71,10 @@ struct SmallTriangles {
             const Ints last = shift_right_signed<subpixel_bits>(maximum(maximum(at[0], at[1]), at[2]));
             is_small = less(last - first, ints(32));
             low = maximum(first, ints(begin)), high = minimum(last, ints(~turned_last));
-            is_whole = equal(first, low) & equal(last, high);
+            // What lies behind the borders of the tile is in none of its blocks.
+            const Lanes all = lanes_of(0xffff);
+            is_whole = (begin == 0 ? all : equal(first, low)) &
+                       (~turned_last == tile_size - 1 ? all : equal(last, high));
         };
         Ints low_x, high_x, low_y, high_y;
         Lanes small_x, small_y, whole_x, whole_y;
@@ -278,7 +281,12 @@ struct Coverage {
         bounded = (from.cut >> lane & 1) != 0;
         const std::int32_t left = x0 / 4, right = x1 / 4, top = y0 / 4, bottom = y1 / 4;
         if (run.simple_depth && run.depth && !bounded && right - left <= 1 && bottom - top <= 1) {
-            run_four_blocks(from, lane, left, right, top, bottom);
+            switch (right - left + 2 * (bottom - top)) {
+                case 0: run_few_blocks<1, 1>(from, lane, left, top); break;
+                case 1: run_few_blocks<2, 1>(from, lane, left, top); break;
+                case 2: run_few_blocks<1, 2>(from, lane, left, top); break;
+                default: run_few_blocks<2, 2>(from, lane, left, top); break;
+            }
             return;
         }
         for (int i = 0; i < 3; ++i)
@@ -286,42 +294,49 @@ struct Coverage {
         run_blocks<3>(left, right, top, bottom);
     }
 
-    /// As run_simple_blocks, for two by two blocks and with a depth test: without loops, and with hardly a branch that
-    /// the processor could guess wrong. Where there is only one row or column, what is done for the other changes
-    /// nothing; the memory of depth goes on behind that of the first sample.
-    [[gnu::always_inline]] void run_four_blocks(const SmallTriangles& from, std::uint32_t lane, std::int32_t first_x,
-                                                std::int32_t last_x, std::int32_t first_y, std::int32_t last_y) {
+    /// As run_simple_blocks, for one or two blocks across and down and with a depth test: without loops, and with
+    /// hardly a branch that the processor could guess wrong.
+    template <int columns, int rows>
+    [[gnu::always_inline]] void run_few_blocks(const SmallTriangles& from, std::uint32_t lane, std::int32_t first_x,
+                                               std::int32_t first_y) {
+        constexpr int count = columns * rows;
+        const auto column = [](int i) { return i % columns; };
+        const auto row = [](int i) { return i / columns; };
         const Record& record = *run.record;
         const DrawPlan& draw = *run.draw;
-        Ints edges_at[4];
+        Ints edges_at[count];
         for (int i = 0; i < 3; ++i) {
             const Ints along_x = ints(from.along_x[i][lane]), along_y = ints(from.along_y[i][lane]);
-            const Ints first = along_x * load(lane_x) + along_y * load(lane_y) + ints(from.at_block[i][lane]);
-            const Ints down = shift_left<2>(along_y);
-            const Ints second = first + shift_left<2>(along_x), third = first + down, fourth = second + down;
-            edges_at[0] = i == 0 ? first : edges_at[0] | first;
-            edges_at[1] = i == 0 ? second : edges_at[1] | second;
-            edges_at[2] = i == 0 ? third : edges_at[2] | third;
-            edges_at[3] = i == 0 ? fourth : edges_at[3] | fourth;
+            const Ints right = shift_left<2>(along_x), down = shift_left<2>(along_y);
+            Ints at[count];
+            at[0] = along_x * load(lane_x) + along_y * load(lane_y) + ints(from.at_block[i][lane]);
+            for (int block = 1; block < count; ++block)
+                at[block] = column(block) != 0 ? at[block - 1] + right : at[block - columns] + down;
+            for (int block = 0; block < count; ++block)
+                edges_at[block] = i == 0 ? at[block] : edges_at[block] | at[block];
         }
         // As in TileRun::depth_at.
         const Floats x = to_floats(load(lane_x)) + floats(static_cast<float>(run.tile_x + 4 * first_x) + 0.5f);
         const Floats y = to_floats(load(lane_y)) + floats(static_cast<float>(run.tile_y + 4 * first_y) + 0.5f);
         const Floats c = floats(record.depth_c), dx = floats(record.depth_dx), dy = floats(record.depth_dy);
         const Floats from_x = floats(record.x0), from_y = floats(record.y0);
-        const Floats in_x[2] = {c + dx * (x - from_x), c + dx * (x + floats(4.0f) - from_x)};
-        const Floats in_y[2] = {dy * (y - from_y), dy * (y + floats(4.0f) - from_y)};
+        Floats in_x[columns], in_y[rows];
+        in_x[0] = c + dx * (x - from_x), in_y[0] = dy * (y - from_y);
+        if constexpr (columns == 2) in_x[1] = c + dx * (x + floats(4.0f) - from_x);
+        if constexpr (rows == 2) in_y[1] = dy * (y + floats(4.0f) - from_y);
         const std::uint32_t place = block_place(first_x, first_y);
-        std::int32_t* const depth = &run.memory.depth[0][0] + place;
+        std::uint32_t offsets[count];
+        for (int i = 0; i < count; ++i) offsets[i] = four_blocks[2 * row(i) + column(i)];
+        std::int32_t* const depth = run.memory.depth[0] + place;
         const DepthLayout layout = run.targets.depth_layout;
-        Ints keys[4], old[4];
-        for (int i = 0; i < 4; ++i) {
-            keys[i] = depth_key(layout, in_x[i & 1] + in_y[i >> 1], run.depth_low, run.depth_high);
-            old[i] = load(depth + four_blocks[i]);
+        Ints keys[count], old[count];
+        for (int i = 0; i < count; ++i) {
+            keys[i] = depth_key(layout, in_x[column(i)] + in_y[row(i)], run.depth_low, run.depth_high);
+            old[i] = load(depth + offsets[i]);
         }
-        Lanes passes[4];
+        Lanes passes[count];
         const auto test = [&](auto&& comparison) {
-            for (int i = 0; i < 4; ++i) passes[i] = not_negative(edges_at[i]) & comparison(keys[i], old[i]);
+            for (int i = 0; i < count; ++i) passes[i] = not_negative(edges_at[i]) & comparison(keys[i], old[i]);
         };
         switch (draw.depth_stencil.compare) {
             case rhi::CompareOperation::less: test([](Ints key, Ints at) { return less(key, at); }); break;
@@ -331,26 +346,28 @@ struct Coverage {
             case rhi::CompareOperation::equal: test([](Ints key, Ints at) { return equal(key, at); }); break;
             default: test([&](Ints key, Ints at) { return compare(draw.depth_stencil.compare, key, at); }); break;
         }
-        std::uint32_t masks[4];
-        for (int i = 0; i < 4; ++i) masks[i] = mask_of(passes[i]);
-        if (draw.depth_stencil.depth_write) {
-            for (int i = 0; i < 4; ++i) store(depth + four_blocks[i], select(passes[i], keys[i], old[i]));
-            const auto note = [&](std::int32_t row, std::uint32_t left_block, std::uint32_t right_block) {
-                const std::uint32_t bits = (left_block != 0 ? 1u : 0u) | (right_block != 0 ? 2u : 0u);
-                run.written_blocks[row] = static_cast<std::uint16_t>(run.written_blocks[row] | bits << first_x);
-            };
-            note(first_y, masks[0], masks[1]), note(first_y + 1, masks[2], masks[3]);
+        std::uint32_t masks[count];
+        std::uint64_t all = 0;
+        for (int i = 0; i < count; ++i) {
+            masks[i] = mask_of(passes[i]);
+            all |= static_cast<std::uint64_t>(masks[i]) << (16 * i);
         }
-        const std::uint64_t both[2] = {masks[0] | static_cast<std::uint64_t>(masks[1]) << 32,
-                                       masks[2] | static_cast<std::uint64_t>(masks[3]) << 32};
-        const std::uint64_t all = both[0] | both[1] << 16;
+        if (draw.depth_stencil.depth_write) {
+            for (int i = 0; i < count; ++i) {
+                store(depth + offsets[i], select(passes[i], keys[i], old[i]));
+                const std::uint32_t bit = (masks[i] != 0 ? 1u : 0u) << (first_x + column(i));
+                std::uint16_t& written = run.written_blocks[first_y + row(i)];
+                written = static_cast<std::uint16_t>(written | bit);
+            }
+        }
         if (all == 0) return;
         run.memory.passed_samples += static_cast<std::uint32_t>(__builtin_popcountll(all));
         if (!draw.shades) return;
-        const std::uint32_t columns = 1u << first_x / region_blocks | 1u << last_x / region_blocks;
-        run.append_four_blocks(
-            place, masks,
-            columns << first_y / region_blocks * regions_across | columns << last_y / region_blocks * regions_across);
+        std::uint32_t regions = 0;
+        for (int i = 0; i < count; ++i)
+            regions |= 1u << ((first_y + row(i)) / region_blocks * regions_across +
+                              (first_x + column(i)) / region_blocks);
+        run.append_blocks<columns, rows>(place, masks, regions);
     }
 
     void draw_triangle() {

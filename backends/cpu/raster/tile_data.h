@@ -27,8 +27,10 @@ inline constexpr std::uint32_t most_samples = 4;
 /// Window coordinates of vertices stay inside of +-this many pixels, so that edge functions inside of a tile fit 32
 /// bits: an edge that crosses a tile changes by at most 63 * (|A| + |B|) <= 63 * 2^25 < 2^31 over it.
 inline constexpr float guard_band = 32767.0f;
-/// Primitives that touch more tiles than this are not sorted into bins; every tile looks at them. It bounds the bins.
-inline constexpr std::int32_t most_binned_tiles = 16;
+/// Primitives whose bounds touch more tiles than this are sorted into bins only as long as the bins of their chunk hold
+/// no more than this for each of its primitives, or of `least_bin_room` if it has less; every tile looks at the others.
+/// It bounds the bins.
+inline constexpr std::uint32_t most_binned_tiles = 16, least_bin_room = 512;
 
 /// Where the standard sample positions lie in a pixel, in 1/256 (Vulkan specification, "Standard sample locations").
 inline constexpr std::int32_t sample_offset_x[most_samples] = {96, 224, 32, 160};

@@ -161,11 +161,19 @@ inline void fill_pixels(const std::uint32_t* texel, std::uint32_t words, const T
     }
 }
 /// The same in a target.
+/// @param streams  as for store_pixels
 inline void fill_texels(const std::uint32_t* texel, std::uint32_t bytes, std::byte* to, std::uint32_t row_stride,
-                        std::int32_t width, std::int32_t height) {
+                        std::int32_t width, std::int32_t height, bool streams) {
     alignas(64) std::byte pattern[64];
     for (std::uint32_t at = 0; at < sizeof(pattern); at += bytes) __builtin_memcpy(pattern + at, texel, bytes);
     const std::size_t length = static_cast<std::size_t>(width) * bytes;
+    const bool aligned = ((reinterpret_cast<std::uintptr_t>(to) | row_stride | length) & 63) == 0;
+    if (streams && aligned) {
+        const Int4 part = load4(pattern);
+        for (std::int32_t y = 0; y < height; ++y, to += row_stride)
+            for (std::size_t at = 0; at < length; at += 16) stream4(to + at, part);
+        return;
+    }
     for (std::int32_t y = 0; y < height; ++y, to += row_stride) {
         std::size_t at = 0;
         for (; at + sizeof(pattern) <= length; at += sizeof(pattern)) std::memcpy(to + at, pattern, sizeof(pattern));

@@ -187,7 +187,8 @@ struct TileRun {
                     if (is_loaded)
                         store_pixels(target.texel_bytes, to, target.row_stride, area, targets.streams_colors);
                     else
-                        fill_texels(target.clear, target.texel_bytes, to, target.row_stride, area.width, area.height);
+                        fill_texels(target.clear, target.texel_bytes, to, target.row_stride, area.width, area.height,
+                                    targets.streams_colors);
                 }
                 if (is_whole) break;
             }
@@ -205,13 +206,13 @@ struct TileRun {
                              plane_area(memory.depth, sample), false);
             else if (depth_clears)
                 fill_texels(&targets.clear_depth, depth_bytes(), depth_texels(sample), targets.depth_row_stride, width,
-                            height);
+                            height, false);
             if (stencil_changed || (stencil_clears && stencil_loaded))
                 store_pixels(1, stencil_texels(sample), targets.stencil_row_stride, plane_area(memory.stencil, sample),
                              false);
             else if (stencil_clears)
                 fill_texels(&targets.clear_stencil, 1, stencil_texels(sample), targets.stencil_row_stride, width,
-                            height);
+                            height, false);
         }
     }
 
@@ -406,16 +407,18 @@ struct TileRun {
         }
         if (stream.quads >= stream_quads) flush_stream(stream_index, stream_quads);
     }
-    /// The same for the four blocks at the corners of two by two, with one sample; `live` may be zero.
-    /// @param regions  one bit for each that a pixel lies in
-    [[gnu::always_inline]] void append_four_blocks(std::uint32_t place, const std::uint32_t (&live)[4],
-                                                   std::uint32_t regions) {
+    /// The same for one or two blocks across and down, with one sample; `live` may be zero for some.
+    /// @param regions  one bit for each that they lie in
+    template <int columns, int rows>
+    [[gnu::always_inline]] void append_blocks(std::uint32_t place, const std::uint32_t (&live)[columns * rows],
+                                              std::uint32_t regions) {
         for (std::uint32_t fresh = regions & ~entered_regions; fresh != 0; fresh &= fresh - 1)
             enter_region(static_cast<std::uint32_t>(__builtin_ctz(fresh)));
         Stream& stream = memory.streams[0];
         const PrimitiveData* const from = &current_primitive();
-        repeat_pointer<16>(stream.primitives + stream.quads, from);
-        for (std::uint32_t block = 0; block < 4; ++block) append_quads(stream, place + four_blocks[block], live[block]);
+        repeat_pointer<4 * columns * rows>(stream.primitives + stream.quads, from);
+        for (int block = 0; block < columns * rows; ++block)
+            append_quads(stream, place + four_blocks[2 * (block / columns) + block % columns], live[block]);
         if (stream.quads >= stream_quads) flush_stream(0, stream_quads);
     }
     template <int count>

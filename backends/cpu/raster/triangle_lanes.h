@@ -43,21 +43,27 @@ struct CornerLanes {
     alignas(64) std::int32_t x[16], y[16], codes[16], offset[16];
     alignas(64) float window_x[16], window_y[16], window_z[16];
 
-    /// @param corner  of each triangle; those behind the last repeat the first
-    void gather(const TriangleSetup& work, std::uint32_t corner) {
+    /// Where they are; those behind the last triangle repeat the first.
+    void gather_fixed(const TriangleSetup& work, std::uint32_t corner) {
         for (std::uint32_t lane = 0; lane < 16; lane += 4) {
             Int4 fixed[4];
-            Float4 window[4];
             for (std::uint32_t i = 0; i < 4; ++i) {
                 const std::uint32_t triangle = lane + i < work.count ? lane + i : 0;
-                const SetupVertex& vertex = work.vertices[work.corners[3 * triangle + corner]];
-                fixed[i] = load4(&vertex);
-                window[i] = load4(reinterpret_cast<const float*>(work.screen + std::size_t{vertex.offset} * 16));
+                fixed[i] = load4(&work.vertices[work.corners[3 * triangle + corner]]);
             }
             transpose(fixed[0], fixed[1], fixed[2], fixed[3]);
-            transpose(window[0], window[1], window[2], window[3]);
             store4(x + lane, fixed[0]), store4(y + lane, fixed[1]);
             store4(codes + lane, fixed[2]), store4(offset + lane, fixed[3]);
+        }
+    }
+    /// What only those need that are drawn.
+    void gather_window(const TriangleSetup& work) {
+        for (std::uint32_t lane = 0; lane < 16; lane += 4) {
+            Float4 window[4];
+            for (std::uint32_t i = 0; i < 4; ++i)
+                window[i] = load4(reinterpret_cast<const float*>(
+                    work.screen + static_cast<std::size_t>(static_cast<std::uint32_t>(offset[lane + i])) * 16));
+            transpose(window[0], window[1], window[2], window[3]);
             store4(window_x + lane, window[0]), store4(window_y + lane, window[1]);
             store4(window_z + lane, window[2]);
         }
@@ -82,9 +88,55 @@ NACRE_LANES_INLINE Doubles depth_bias(const TriangleSetup& work, Doubles slope, 
     return result - result == 0.0 ? result : Doubles{};
 }
 
+/// Pixels with a center inside of the bounds of a triangle, inclusive.
+struct PixelBounds {
+    Ints low_x, high_x, low_y, high_y;
+    Lanes few;  ///< At most two columns and two rows, of all pixels that there could be.
+};
+NACRE_LANES_INLINE PixelBounds pixel_bounds(const TriangleSetup& work, const CornerLanes (&corners)[3]) {
+    const auto range = [](const std::int32_t* one, const std::int32_t* other, const std::int32_t* third,
+                          std::int32_t begin, std::int32_t end, Ints& low, Ints& high) {
+        const Ints first = load(one), second = load(other), last = load(third);
+        low = shift_right_signed<subpixel_bits>(minimum(minimum(first, second), last) + ints(subpixels / 2 - 1));
+        high = shift_right_signed<subpixel_bits>(maximum(maximum(first, second), last) - ints(subpixels / 2));
+        const Lanes few = less(high - low, ints(2));
+        low = maximum(low, ints(begin)), high = minimum(high, ints(end - 1));
+        return few;
+    };
+    PixelBounds bounds;
+    const CornerLanes &a = corners[0], &b = corners[1], &c = corners[2];
+    const Lanes few_columns = range(a.x, b.x, c.x, work.x_begin, work.x_end, bounds.low_x, bounds.high_x);
+    const Lanes few_rows = range(a.y, b.y, c.y, work.y_begin, work.y_end, bounds.low_y, bounds.high_y);
+    bounds.few = few_columns & few_rows;
+    return bounds;
+}
+
+/// Of triangles with few pixels inside of their bounds: those that cover none of them, by the edge functions of
+/// tile_coverage.h, which need no more than 32 bits here.
+/// @param x  of the corners, clockwise
+NACRE_LANES_INLINE std::uint32_t covers_nothing(const PixelBounds& bounds, const Ints (&x)[3], const Ints (&y)[3]) {
+    const Lanes two_columns = less(bounds.low_x, bounds.high_x), two_rows = less(bounds.low_y, bounds.high_y);
+    // From the center of the first pixel.
+    const Ints first_x = shift_left<subpixel_bits>(bounds.low_x) + ints(subpixels / 2);
+    const Ints first_y = shift_left<subpixel_bits>(bounds.low_y) + ints(subpixels / 2);
+    Ints outside[4];
+    for (int i = 0; i < 3; ++i) {
+        const int next = i == 2 ? 0 : i + 1;
+        const Ints edge_a = y[i] - y[next], edge_b = x[next] - x[i];
+        const Lanes owns_border = less(ints(0), edge_a) | (equal(edge_a, ints(0)) & less(ints(0), edge_b));
+        const Ints value =
+            select(owns_border, ints(0), ints(-1)) + edge_a * (first_x - x[i]) + edge_b * (first_y - y[i]);
+        const Ints along_x = select(two_columns, shift_left<subpixel_bits>(edge_a), ints(0));
+        const Ints along_y = select(two_rows, shift_left<subpixel_bits>(edge_b), ints(0));
+        const Ints at[4] = {value, value + along_x, value + along_y, value + along_x + along_y};
+        for (int pixel = 0; pixel < 4; ++pixel) outside[pixel] = i == 0 ? at[pixel] : outside[pixel] | at[pixel];
+    }
+    return mask_of(bounds.few & ~not_negative(outside[0] & outside[1] & outside[2] & outside[3]));
+}
+
 inline void set_up_triangles(TriangleSetup& work) {
     CornerLanes corners[3];
-    for (std::uint32_t i = 0; i < 3; ++i) corners[i].gather(work, i);
+    for (std::uint32_t i = 0; i < 3; ++i) corners[i].gather_fixed(work, i);
     const CornerLanes &a = corners[0], &b = corners[1], &c = corners[2];
 
     const auto has = [](const Ints& codes, std::uint32_t bits) {
@@ -95,34 +147,44 @@ inline void set_up_triangles(TriangleSetup& work) {
     const Lanes outside = has(any, not_finite) | has(all, outside_view | clip_distances_mask | cull_distances_mask);
     const Lanes clipped = has(any, outside_near | outside_far | outside_guard | clip_distances_mask);
 
-    // Pixels with a center inside of the bounds.
-    const auto bounds = [](const std::int32_t* one, const std::int32_t* other, const std::int32_t* third,
-                           std::int32_t begin, std::int32_t end, Ints& low, Ints& high) {
-        const Ints first = load(one), second = load(other), last = load(third);
-        low = shift_right_signed<subpixel_bits>(minimum(minimum(first, second), last) + ints(subpixels / 2 - 1));
-        high = shift_right_signed<subpixel_bits>(maximum(maximum(first, second), last) - ints(subpixels / 2));
-        low = maximum(low, ints(begin)), high = minimum(high, ints(end - 1));
-    };
-    Ints low_x, high_x, low_y, high_y;
-    bounds(a.x, b.x, c.x, work.x_begin, work.x_end, low_x, high_x);
-    bounds(a.y, b.y, c.y, work.y_begin, work.y_end, low_y, high_y);
-    const std::uint32_t nowhere = mask_of(less(high_x, low_x) | less(high_y, low_y));
+    const PixelBounds bounds = pixel_bounds(work, corners);
+    const std::uint32_t nowhere =
+        mask_of(less(bounds.high_x, bounds.low_x) | less(bounds.high_y, bounds.low_y));
 
-    alignas(64) float slope_x[16], slope_y[16], depth[16];
-    std::uint32_t clockwise = 0, flat = 0, thin = 0;
+    std::uint32_t clockwise = 0, flat = 0;
     for (int half = 0; half < 16; half += 8) {
         // Differences of coordinates have 24 bits, so that doubles hold the products.
         const Doubles fixed_x = doubles_of(a.x + half), fixed_y = doubles_of(a.y + half);
         const Doubles fixed_area = (doubles_of(b.x + half) - fixed_x) * (doubles_of(c.y + half) - fixed_y) -
                                    (doubles_of(c.x + half) - fixed_x) * (doubles_of(b.y + half) - fixed_y);
+        clockwise |= mask_of_eight(fixed_area > 0.0) << half;
+        flat |= mask_of_eight(fixed_area == 0.0) << half;
+    }
+    const std::uint32_t asked = (work.count == 16 ? 0xffffu : (1u << work.count) - 1) & ~mask_of(outside);
+    const std::uint32_t front = work.front_is_clockwise ? clockwise : ~clockwise;
+    const std::uint32_t culled = flat | (work.cull == rhi::CullMode::front  ? front
+                                         : work.cull == rhi::CullMode::back ? ~front
+                                                                            : 0);
+    work.special = asked & mask_of(clipped);
+    std::uint32_t drawn = asked & ~work.special & ~culled & ~nowhere;
+    work.drawn = 0;
+    if (drawn == 0) return;
+    const Lanes keeps = lanes_of(clockwise);
+    const Ints turned_x[3] = {load(a.x), select(keeps, load(b.x), load(c.x)), select(keeps, load(c.x), load(b.x))};
+    const Ints turned_y[3] = {load(a.y), select(keeps, load(b.y), load(c.y)), select(keeps, load(c.y), load(b.y))};
+    drawn &= ~covers_nothing(bounds, turned_x, turned_y);
+    if (drawn == 0) return;
+
+    for (CornerLanes& corner : corners) corner.gather_window(work);
+    alignas(64) float slope_x[16], slope_y[16], depth[16];
+    std::uint32_t thin = 0;
+    for (int half = 0; half < 16; half += 8) {
         const Doubles x0 = doubles_of(a.window_x + half), y0 = doubles_of(a.window_y + half);
         const Doubles z0 = doubles_of(a.window_z + half);
         const Doubles x1 = doubles_of(b.window_x + half) - x0, y1 = doubles_of(b.window_y + half) - y0;
         const Doubles x2 = doubles_of(c.window_x + half) - x0, y2 = doubles_of(c.window_y + half) - y0;
         const Doubles z1 = doubles_of(b.window_z + half) - z0, z2 = doubles_of(c.window_z + half) - z0;
         const Doubles area = x1 * y2 - x2 * y1;
-        clockwise |= mask_of_eight(fixed_area > 0.0) << half;
-        flat |= mask_of_eight(fixed_area == 0.0) << half;
         thin |= (mask_of_eight(magnitude(area) < thin_area) | (mask_of_eight(area > 0.0) ^ (clockwise >> half & 0xff)))
                 << half;
         const Doubles scale = 1.0 / area;
@@ -140,24 +202,17 @@ inline void set_up_triangles(TriangleSetup& work) {
         };
         put(slope_x, dx), put(slope_y, dy), put(depth, base);
     }
-    const std::uint32_t asked = (work.count == 16 ? 0xffffu : (1u << work.count) - 1) & ~mask_of(outside);
-    const std::uint32_t front = work.front_is_clockwise ? clockwise : ~clockwise;
-    const std::uint32_t culled = flat | (work.cull == rhi::CullMode::front  ? front
-                                         : work.cull == rhi::CullMode::back ? ~front
-                                                                            : 0);
-    const std::uint32_t special = asked & mask_of(clipped);
-    const std::uint32_t drawn = asked & ~special & ~culled & ~nowhere;
-    work.special = special | (drawn & thin);
+    work.special |= drawn & thin;
     work.drawn = drawn & ~thin;
     if (work.drawn == 0) return;
 
-    store(work.left, shift_right_signed<tile_bits>(low_x)), store(work.right, shift_right_signed<tile_bits>(high_x));
-    store(work.top, shift_right_signed<tile_bits>(low_y)), store(work.bottom, shift_right_signed<tile_bits>(high_y));
-    const Lanes keeps = lanes_of(clockwise);
-    const Ints x1 = select(keeps, load(b.x), load(c.x)), x2 = select(keeps, load(c.x), load(b.x));
-    const Ints y1 = select(keeps, load(b.y), load(c.y)), y2 = select(keeps, load(c.y), load(b.y));
+    store(work.left, shift_right_signed<tile_bits>(bounds.low_x));
+    store(work.right, shift_right_signed<tile_bits>(bounds.high_x));
+    store(work.top, shift_right_signed<tile_bits>(bounds.low_y));
+    store(work.bottom, shift_right_signed<tile_bits>(bounds.high_y));
     alignas(64) std::int32_t swapped[4][16], bits[16], numbers[16];
-    store(swapped[0], x1), store(swapped[1], x2), store(swapped[2], y1), store(swapped[3], y2);
+    store(swapped[0], turned_x[1]), store(swapped[1], turned_x[2]);
+    store(swapped[2], turned_y[1]), store(swapped[3], turned_y[2]);
     store(bits, select(lanes_of(front), ints(Record::front_facing), ints(0)) |
                     select(keeps, ints(0), ints(Record::swapped)) | ints(static_cast<std::int32_t>(work.draw_bits)));
     store(numbers, ints(static_cast<std::int32_t>(work.first_primitive)) + load(lane_numbers));

@@ -24,10 +24,11 @@ constexpr float log_rest[] = {0x1.555554p-2f, -0x1.000226p-2f, 0x1.99a008p-3f, -
 constexpr double ln2_high = 0x1.62e4p-1;
 constexpr double ln2_low = 0x1.7f7d1cp-20;
 
-/// power * 2^(n + shift), where `rounded_bits` are those of Rounded for n. NaN stays NaN whatever the bits.
-Term scale(const Term& power, const Term& rounded_bits, int shift) {
+/// power * 2^(n + shift) for a whole number n. NaN stays NaN whatever the bits of n.
+Term scale(const Term& power, const Rounded& n, int shift) {
+    if (has_exponent_instructions(power)) return times_power_of_two(power, shift == 0 ? n.number : n.number + shift);
     constexpr int shifter_bits = 0x4b400000;
-    const Term twice_biased = rounded_bits + (254 + shift - shifter_bits);
+    const Term twice_biased = n.bits + (254 + shift - shifter_bits);
     const Term first = twice_biased >> 1;
     const Term second = twice_biased - first;
     return power * (first << 23).from_bits() * (second << 23).from_bits();
@@ -39,7 +40,7 @@ Term exponential2(const Term& x) {
     const Rounded octaves = round_to_whole(bounded);
     const Term rest = bounded - octaves.number;
     const Term power = multiply_add(rest, polynomial(rest, exp2_rest), rest.number(1));
-    return scale(power, octaves.bits, 0);
+    return scale(power, octaves, 0);
 }
 
 struct Decomposed {
@@ -48,6 +49,11 @@ struct Decomposed {
 };
 
 Decomposed decompose(const Term& x) {
+    if (has_exponent_instructions(x)) {
+        const Term significand = significand_of(x), exponent = exponent_of(x);
+        const Term is_high = significand >= 0x1.6a09e6p+0;
+        return {select(is_high, significand * 0.5, significand) - 1.0, select(is_high, exponent + 1.0, exponent)};
+    }
     const Term denormal = x < 0x1p-126;
     const Term bits = select(denormal, x * 0x1p23, x).to_bits();
     constexpr int root_half_bits = 0x3f3504f3;
@@ -59,6 +65,8 @@ Decomposed decompose(const Term& x) {
 
 /// What a logarithm is where x is not a positive finite number.
 Term logarithm_edges(const Term& x, const Term& result) {
+    // There the parts of x lead to just that.
+    if (has_exponent_instructions(x)) return result;
     const Term infinity = x.number(std::numeric_limits<double>::infinity());
     const Term not_positive = select(x == 0.0, -infinity, x.number(std::numeric_limits<double>::quiet_NaN()));
     const Term not_finite = x.with(x.builder().CreateFCmpUGE(x.value(), infinity.value()));
@@ -77,7 +85,7 @@ Term exponential(const Term& x, int shift) {
     const Rounded octaves = round_to_whole(bounded * std::numbers::log2e);
     const Term rest = multiply_add(octaves.number, -ln2_low, multiply_add(octaves.number, -ln2_high, bounded));
     const Term power = multiply_add(rest * rest, polynomial(rest, exp_rest), rest) + 1.0;
-    return scale(power, octaves.bits, shift);
+    return scale(power, octaves, shift);
 }
 
 Term logarithm(const Term& w, const Term* correction) {

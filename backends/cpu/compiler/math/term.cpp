@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/cpu/compiler/math/term.h"
 
+#include <llvm/IR/IntrinsicsX86.h>
 #include <llvm/IR/Module.h>
+
+#include <algorithm>
+#include <array>
 
 namespace nacre::cpu {
 
@@ -121,6 +125,59 @@ Term polynomial(const Term& x, std::span<const float> coefficients) {
 
 Term resize(const Term& x, llvm::Type* element, bool is_signed) {
     return x.with(x.builder().CreateIntCast(x.value(), x.type_of(element), is_signed));
+}
+
+namespace {
+
+unsigned lanes_of(const Term& x) {
+    const auto* vector = llvm::dyn_cast<llvm::FixedVectorType>(x.type());
+    return vector ? vector->getNumElements() : 1;
+}
+
+/// A masked instruction of AVX-512 that does a thing to every lane. Scalars go through the first lane of a vector.
+/// @param intrinsics  for 4, 8 and 16 lanes
+Term for_all_lanes(const std::array<llvm::Intrinsic::ID, 3>& intrinsics, std::vector<llvm::Value*> operands,
+                   const Term& x) {
+    llvm::IRBuilder<>& builder = x.builder();
+    const unsigned lanes = std::max(lanes_of(x), 4u);
+    auto* const vector = llvm::FixedVectorType::get(builder.getFloatTy(), lanes);
+    const bool is_scalar = !x.type()->isVectorTy();
+    for (llvm::Value*& operand : operands)
+        if (operand->getType()->isFloatTy())
+            operand = builder.CreateInsertElement(llvm::Constant::getNullValue(vector), operand, std::uint64_t{0});
+    operands.push_back(llvm::Constant::getNullValue(vector));
+    operands.push_back(llvm::ConstantInt::getAllOnesValue(builder.getIntNTy(std::max(lanes, 8u))));
+    constexpr std::uint32_t rounds_as_set = 4;
+    if (lanes == 16) operands.push_back(builder.getInt32(rounds_as_set));
+    llvm::Value* result = builder.CreateIntrinsic(intrinsics[lanes == 4 ? 0 : lanes == 8 ? 1 : 2], {}, operands);
+    return x.with(is_scalar ? builder.CreateExtractElement(result, std::uint64_t{0}) : result);
+}
+
+}  // namespace
+
+bool has_exponent_instructions(const Term& x) {
+    const unsigned lanes = lanes_of(x);
+    return x.emission().options.exponent_instructions && x.element()->isFloatTy() &&
+           (lanes == 1 || lanes == 4 || lanes == 8 || lanes == 16);
+}
+
+Term exponent_of(const Term& x) {
+    using namespace llvm::Intrinsic;
+    return for_all_lanes({x86_avx512_mask_getexp_ps_128, x86_avx512_mask_getexp_ps_256, x86_avx512_mask_getexp_ps_512},
+                         {x.value()}, x);
+}
+
+Term significand_of(const Term& x) {
+    constexpr std::uint32_t from_one_to_two = 0, negative_is_nan = 2 << 2;
+    using namespace llvm::Intrinsic;
+    return for_all_lanes({x86_avx512_mask_getmant_ps_128, x86_avx512_mask_getmant_ps_256, x86_avx512_mask_getmant_ps_512},
+                         {x.value(), x.builder().getInt32(from_one_to_two | negative_is_nan)}, x);
+}
+
+Term times_power_of_two(const Term& x, const Term& exponent) {
+    using namespace llvm::Intrinsic;
+    return for_all_lanes({x86_avx512_mask_scalef_ps_128, x86_avx512_mask_scalef_ps_256, x86_avx512_mask_scalef_ps_512},
+                         {x.value(), exponent.value()}, x);
 }
 
 Rounded round_to_whole(const Term& x) {

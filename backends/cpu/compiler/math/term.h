@@ -121,6 +121,15 @@ Term half_to_single(const Term& half_bits);
 Term single_to_half(const Term& x);
 Term convert(const Term& x, llvm::Type* element);
 
+/// Whether MathOptions::exponent_instructions hold for x: single precision, and as many lanes as some register has.
+bool has_exponent_instructions(const Term& x);
+// By those instructions.
+Term exponent_of(const Term& x);     ///< floor(log2(|x|)) as a number; infinite for zero and infinities.
+/// x / 2^exponent_of(x): 1 for infinity and zero (-1 for the negative one), NaN for negative x.
+Term significand_of(const Term& x);
+/// x * 2^exponent with one rounding; the exponent is whole.
+Term times_power_of_two(const Term& x, const Term& exponent);
+
 /// Evaluates a function that can only be written for float and double for half too: by way of float.
 template <typename Function, typename... Terms>
 Term widen_half(Function function, const Term& first, const Terms&... others) {

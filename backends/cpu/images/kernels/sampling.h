@@ -131,15 +131,21 @@ NACRE_INLINE void footprint(const Sampling<W>& sampling, const Source& source, c
                  {sampler.address_u, sampler.address_v, sampler.address_w}, offset, taps);
 }
 
+/// Adds two texels to a weighted sum.
+template <int W>
+NACRE_INLINE void add_weighted(const Floats<W> (&first)[4], const Floats<W> (&second)[4], int channels,
+                               Floats<W> first_weight, Floats<W> second_weight, Floats<W>* sum) {
+    for (int c = 0; c < channels; ++c) sum[c] = sum[c] + first_weight * first[c];
+    for (int c = 0; c < channels; ++c) sum[c] = sum[c] + second_weight * second[c];
+}
+
 /// Adds two texels of a footprint, with their weights.
 template <int W, Codec C>
 NACRE_INLINE void add_two_texels(const Source& source, const Place<W>& first, const Place<W>& second,
                                  bool are_neighbors, Floats<W> first_weight, Floats<W> second_weight, Floats<W>* sum) {
     Floats<W> texels[2][4];
     load_two_raw<W, C>(source, first, second, are_neighbors, texels);
-    const int channels = raw_channels<C>(*source.plan);
-    for (int c = 0; c < channels; ++c) sum[c] = sum[c] + first_weight * texels[0][c];
-    for (int c = 0; c < channels; ++c) sum[c] = sum[c] + second_weight * texels[1][c];
+    add_weighted<W>(texels[0], texels[1], raw_channels<C>(*source.plan), first_weight, second_weight, sum);
 }
 
 /// A linear sample of a cube whose footprint lies on one face in all lanes. False: it does not, and nothing was done.
@@ -148,8 +154,24 @@ template <int W, Codec C>
                                    Floats<W>* out) {
     const CubeCorner<W> corner = cube_corner<W>(source.width, cube);
     if (corner.crosses) return false;
-    const Place<W> place = place_texel<W>(source, corner.x, corner.y, first_slice + cube.face);
     Floats<W> sum[4] = {};
+#ifdef __AVX512F__
+    if constexpr (W == 16 && C == Codec::half4) {
+        Floats<W> texels[4][4];
+        if (load_near_footprints(source, corner.x, corner.y, first_slice + cube.face, texels)) {
+            const auto add_near_row = [&](int row, Floats<W> weight_y) {
+                add_weighted<W>(texels[2 * row], texels[2 * row + 1], 4, (1.0f - corner.fx) * weight_y,
+                                corner.fx * weight_y, sum);
+            };
+            add_near_row(0, 1.0f - corner.fy);
+            add_near_row(1, corner.fy);
+            for (int c = 0; c < 4; ++c) out[c] = sum[c];
+            finish_raw<W, C>(*source.plan, out);
+            return true;
+        }
+    }
+#endif
+    const Place<W> place = place_texel<W>(source, corner.x, corner.y, first_slice + cube.face);
     const auto add_row = [&](Ints<W> offset, Floats<W> weight_y) {
         Place<W> first, second;
         first.offset = offset, second.offset = offset + 4 * raw_words<C>;

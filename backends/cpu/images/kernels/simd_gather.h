@@ -123,6 +123,8 @@ NACRE_INLINE void gather_quads(const std::byte* base, Ints<W> offset, Ints<W>* w
         // The fours of lane i lie where those of lanes i, i + 4, i + 8, i + 12 make one register.
         alignas(64) std::int32_t places[W];
         __builtin_memcpy(places, &offset, sizeof places);
+        // In memory indeed: to take lanes out of registers is several times the work of loading them.
+        asm("" : "+m"(places));
         const auto four = [&](int lane) {
             return _mm_loadu_si128(reinterpret_cast<const __m128i*>(base + places[lane]));
         };

@@ -281,6 +281,42 @@ NACRE_INLINE void load_two_raw(const Source& source, const Place<W>& first, cons
     }
 }
 
+#ifdef __AVX512F__
+/// The texels of footprints of two by two that begin at (x, y), where those of all lanes lie within four by three
+/// texels of one slice, as they do where an image is magnified: these are loaded and converted once, and lanes take
+/// theirs by permutations. False: they do not, and nothing was done. The footprints lie inside of the level.
+/// @param texels  left and right of the upper row, then of the lower one
+NACRE_INLINE bool load_near_footprints(const Source& source, Ints<16> x, Ints<16> y, Ints<16> slice,
+                                       Floats<16> (&texels)[4][4]) {
+    constexpr std::int32_t window_width = 4;
+    if (source.width < window_width) return false;
+    // The window begins where the lane before the first one does that lies farthest from it, inside of the level.
+    const std::int32_t first_x = x[0], first_y = y[0], first_slice = slice[0];
+    const auto any = [](Ints<16> lanes) { return mask_bits<16>(lanes) != 0 ? 1 : 0; };
+    const std::int32_t leftmost = first_x - any(x < first_x) - any(x < first_x - 1), top = first_y - any(y < first_y);
+    const std::int32_t left = leftmost < source.width - window_width ? leftmost : source.width - window_width;
+    const Ints<16> column = x - left, row = y - top;
+    if (any(((Uints<16>)column > 2u) | ((Uints<16>)row > 1u) | (slice != first_slice)) != 0) return false;
+    const std::byte* const begin = source.base + static_cast<std::uint64_t>(first_slice) * source.slice_stride +
+                                   static_cast<std::ptrdiff_t>(left) * 8;
+    // Nobody takes anything from a row behind the last.
+    const auto load = [&](std::int32_t number) {
+        const std::int32_t row_loaded = number < source.height ? number : source.height - 1;
+        const std::byte* const from = begin + static_cast<std::ptrdiff_t>(row_loaded) * source.row_stride;
+        return _mm512_maskz_cvtph_ps(0xffff, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
+    };
+    const __m512 rows[3] = {load(top), load(top + 1), load(top + 2)};
+    const Ints<16> place = column * 4 + row * 16;
+    for (int right = 0; right < 2; ++right)
+        for (int c = 0; c < 4; ++c) {
+            const auto at = (__m512i)(place + (4 * right + c));
+            texels[right][c] = (Floats<16>)_mm512_permutex2var_ps(rows[0], at, rows[1]);
+            texels[2 + right][c] = (Floats<16>)_mm512_permutex2var_ps(rows[1], at, rows[2]);
+        }
+    return true;
+}
+#endif
+
 template <Codec C>
 NACRE_INLINE float raw_scale(const FormatPlan& plan, int c) {
     if constexpr (C == Codec::rgba8 || C == Codec::block_rgba8)

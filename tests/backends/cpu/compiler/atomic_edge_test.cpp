@@ -138,20 +138,22 @@ void check(bool in_workgroup) {
         if (in_workgroup)
             text += fmt::format("%left{0} = OpLoad %t %shared_place\nOpStore %left_place{0} %left{0}\n", i);
     }
-    const ComputeRunner runner{
-        .spec = "cpu:consistent",
-        .result_words = static_cast<std::uint32_t>(list.size() * 2 * invocations * sizeof(T) / 4)};
-    const auto found = runner.run_assembly(text + "OpReturn\nOpFunctionEnd\n", 0x10300);
-    ASSERT_TRUE(found) << found.error().message();
-    std::vector<T> values(list.size() * 2 * invocations);
-    std::memcpy(values.data(), found->data(), values.size() * sizeof(T));
-    for (std::size_t i = 0; i < list.size(); ++i)
-        for (std::size_t at = 0; at < invocations; ++at) {
-            const T x = static_cast<T>(edges[at / 8]), y = static_cast<T>(edges[at % 8]);
-            EXPECT_EQ(values[i * 2 * invocations + at], x) << list[i].text << " returns what was there";
-            EXPECT_EQ(values[(i * 2 + 1) * invocations + at], list[i].left(x, y))
-                << list[i].text << " of " << +x << ", " << +y;
-        }
+    for (const char* spec : {"cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16"}) {
+        SCOPED_TRACE(spec);
+        const ComputeRunner runner{
+            .spec = spec, .result_words = static_cast<std::uint32_t>(list.size() * 2 * invocations * sizeof(T) / 4)};
+        const auto found = runner.run_assembly(text + "OpReturn\nOpFunctionEnd\n", 0x10300);
+        ASSERT_TRUE(found) << found.error().message();
+        std::vector<T> values(list.size() * 2 * invocations);
+        std::memcpy(values.data(), found->data(), values.size() * sizeof(T));
+        for (std::size_t i = 0; i < list.size(); ++i)
+            for (std::size_t at = 0; at < invocations; ++at) {
+                const T x = static_cast<T>(edges[at / 8]), y = static_cast<T>(edges[at % 8]);
+                EXPECT_EQ(values[i * 2 * invocations + at], x) << list[i].text << " returns what was there";
+                EXPECT_EQ(values[(i * 2 + 1) * invocations + at], list[i].left(x, y))
+                    << list[i].text << " of " << +x << ", " << +y;
+            }
+    }
 }
 
 template <typename T>

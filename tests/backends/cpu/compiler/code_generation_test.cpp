@@ -10,6 +10,22 @@
 namespace nacre::cpu {
 namespace {
 
+#if defined(__x86_64__)
+TEST(CodeGeneration, UsesTheInstructionsOfTheProcessor) {
+    const bool has_half = __builtin_cpu_supports("avx2"), has_exponents = __builtin_cpu_supports("avx512vl");
+    for (const bool contract : {false, true}) {
+        const auto generator = CodeGenerator::create(16, contract);
+        ASSERT_TRUE(generator) << generator.error().message();
+        const MathOptions& options = (*generator)->math_options();
+        EXPECT_EQ(options.contract, contract);
+        // Processors with AVX2 have F16C.
+        EXPECT_TRUE(options.half_instructions || !has_half);
+        // Their results are not the bits of other processors.
+        EXPECT_EQ(options.exponent_instructions, contract && has_exponents);
+    }
+}
+#endif
+
 TEST(CodeGeneration, EndsForJoinedMasksOfScalarConditions) {
     const auto generator = CodeGenerator::create(8, false);
     ASSERT_TRUE(generator) << generator.error().message();

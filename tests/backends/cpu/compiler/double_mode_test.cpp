@@ -50,7 +50,8 @@ class Bench {
     Buffer storage(std::uint64_t bytes) {
         return ok(device_->create_buffer({.size = bytes,
                                           .usage = BufferUsage::storage | BufferUsage::copy_source |
-                                                   BufferUsage::copy_destination | BufferUsage::vertex,
+                                                   BufferUsage::copy_destination | BufferUsage::vertex |
+                                                   BufferUsage::uniform_texel | BufferUsage::storage_texel,
                                           .name = "storage"}));
     }
     BindGroup group(auto pipeline, std::vector<BindGroupEntry> entries) {
@@ -645,6 +646,67 @@ TEST(DoubleMode, StorageImagesKeepDoublesAndSamplingFiltersThem) {
             EXPECT_NEAR(found[static_cast<std::size_t>(2 * at + 1)], filtered, 1e-14) << name << " " << at;
         }
     }
+}
+
+TEST(DoubleMode, TexelBuffersOfFloatsHaveTheDoublesOfTheirBuffer) {
+    Bench bench("cpu:double");
+    struct Case {
+        Format format;
+        const char* layout;
+        std::size_t channels;
+    };
+    for (const Case& one : {Case{Format::r32_float, "r32f", 1}, Case{Format::rg32_float, "rg32f", 2},
+                            Case{Format::rgba32_float, "rgba32f", 4}}) {
+        const std::size_t words = 64 * one.channels;
+        const auto value = [](std::size_t word) { return 1.0 / static_cast<double>(3 + word); };
+        const auto texels = [&](std::uint32_t binding, Buffer buffer) {
+            return BindGroupEntry{.binding = binding, .buffer = buffer, .offset = 32, .format = one.format};
+        };
+        // Written as a block, fetched and loaded as elements.
+        const Buffer block = bench.storage(32 + 4 * words), image = bench.storage(32 + 4 * words),
+                     to = bench.storage(words * 2 * 8);
+        const std::string channels = std::to_string(one.channels);
+        const std::string floats = "layout(set = 0, binding = 1) buffer Floats { float before[8]; float floats[]; };\n";
+        bench.dispatch(prelude + floats + "void main() { for (uint c = 0; c < " + channels + "; ++c)\nfloats[at * " + channels +
+                           " + c] = 1.0 / float(3 + at * " + channels + " + c); }\n",
+                       {{.binding = 1, .buffer = block}});
+        bench.dispatch(prelude + result +
+                           "layout(set = 0, binding = 1) uniform samplerBuffer fetched;\n"
+                           "layout(set = 0, binding = 2, " + one.layout + ") readonly uniform imageBuffer loaded;\n"
+                           "layout(set = 0, binding = 3, " + one.layout + ") writeonly uniform imageBuffer stored;\n"
+                           "void main() {\nvec4 a = texelFetch(fetched, int(at)), b = imageLoad(loaded, int(at));\n"
+                           "imageStore(stored, int(at), b);\nfor (uint c = 0; c < " + channels + "; ++c) {\n"
+                           "result[2 * (at * " + channels + " + c)] = exactly(a[c]);\n"
+                           "result[2 * (at * " + channels + " + c) + 1] = exactly(b[c]); } }\n",
+                       {{.binding = 0, .buffer = to}, texels(1, block), texels(2, block), texels(3, image)});
+        auto found = bench.read<double>(to, words * 2);
+        for (std::size_t i = 0; i < words; ++i) {
+            ASSERT_EQ(found[2 * i], value(i)) << one.layout << " " << i;
+            ASSERT_EQ(found[2 * i + 1], value(i)) << one.layout << " " << i;
+        }
+        // Written as elements, read as a block.
+        bench.dispatch(prelude + result + floats + "void main() { for (uint c = 0; c < " + channels +
+                           "; ++c) result[at * " + channels + " + c] = exactly(floats[at * " + channels + " + c]); }\n",
+                       {{.binding = 0, .buffer = to}, {.binding = 1, .buffer = image}});
+        found = bench.read<double>(to, words);
+        for (std::size_t i = 0; i < words; ++i) ASSERT_EQ(found[i], value(i)) << one.layout << " " << i;
+        // What the host writes hides the doubles.
+        std::vector<float> host(8 + words, 0.1f);
+        Bench::ok(bench.device().write_buffer(image, std::span<const float>(host)));
+        bench.dispatch(prelude + result + "layout(set = 0, binding = 1) uniform samplerBuffer fetched;\n"
+                           "void main() { result[at] = exactly(texelFetch(fetched, int(at)).x); }\n",
+                       {{.binding = 0, .buffer = to}, texels(1, image)});
+        for (const double one_value : bench.read<double>(to, 64)) ASSERT_EQ(one_value, static_cast<double>(0.1f));
+    }
+    // Other formats hold what their bits hold.
+    const Buffer halves = bench.storage(64 * 8), to = bench.storage(64 * 8);
+    bench.dispatch(prelude + "layout(set = 0, binding = 1, rgba16f) writeonly uniform imageBuffer stored;\n"
+                             "void main() { imageStore(stored, int(at), vec4(1.0 / 3.0)); }\n",
+                   {{.binding = 1, .buffer = halves, .format = Format::rgba16_float}});
+    bench.dispatch(prelude + result + "layout(set = 0, binding = 1) uniform samplerBuffer fetched;\n"
+                                      "void main() { result[at] = exactly(texelFetch(fetched, int(at)).x); }\n",
+                   {{.binding = 0, .buffer = to}, {.binding = 1, .buffer = halves, .format = Format::rgba16_float}});
+    for (const double one_value : bench.read<double>(to, 64)) ASSERT_EQ(one_value, 0x1.554p-2);
 }
 
 TEST(DoubleMode, CodesOfTexturesAreExactInDouble) {

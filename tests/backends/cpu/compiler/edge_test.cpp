@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -95,9 +96,16 @@ const Operation operations[] = {
      [](Word x, Word) { return is_nan(x) ? 0u : as_bits(as_float(x) > 0 ? 1.0f : as_float(x) < 0 ? -1.0f : 0.0f); }, true},
 };
 
-TEST(CpuEdges, OperationsGiveWhatTheyPromise) {
+class CpuEdges : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Cpu, CpuEdges,
+                         testing::Values("cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16"),
+                         [](const auto& parameter) {
+                             return "lanes_" + std::string(parameter.param).substr(std::strlen("cpu:consistent:lanes="));
+                         });
+
+TEST_P(CpuEdges, OperationsGiveWhatTheyPromise) {
     rhi::Instance instance(all_backends());
-    const auto device = instance.create_device({.backend = "cpu:consistent"});
+    const auto device = instance.create_device({.backend = GetParam()});
     ASSERT_TRUE(device) << device.error().message();
     const std::size_t count = std::size(operations), pairs = edges.size() * edges.size();
     std::string text =

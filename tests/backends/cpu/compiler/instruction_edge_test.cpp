@@ -18,40 +18,12 @@
 #include <vector>
 
 #include "tests/backends/cpu/compiler/compute_runner.h"
+#include "tests/backends/cpu/compiler/half_number.h"
 
 namespace nacre::cpu {
 namespace {
 
 using Word = std::uint64_t;
-
-/// A number of 16 bits. Sums, products, quotients and square roots of such numbers, made in double precision and
-/// rounded to one, are rounded as if only once.
-struct Half {
-    std::uint16_t bits = 0;
-    Half() = default;
-    explicit Half(double value) {
-        const std::uint16_t sign = std::signbit(value) ? 0x8000 : 0;
-        const double magnitude = std::abs(value);
-        if (std::isnan(value))
-            bits = 0x7e00;
-        else if (magnitude >= 65520)
-            bits = sign | 0x7c00;
-        else if (magnitude < 0x1p-14)
-            bits = static_cast<std::uint16_t>(sign | static_cast<int>(std::nearbyint(magnitude * 0x1p24)));
-        else {
-            const int exponent = std::ilogb(magnitude);
-            const auto significand = static_cast<int>(std::nearbyint(std::ldexp(magnitude, 10 - exponent)));
-            bits = static_cast<std::uint16_t>(sign | (((exponent + 14) << 10) + significand));
-        }
-    }
-    operator double() const {
-        const int exponent = bits >> 10 & 31, fraction = bits & 1023;
-        const double magnitude = exponent == 0    ? fraction * 0x1p-24
-                                 : exponent == 31 ? (fraction ? std::nan("") : HUGE_VAL)
-                                                  : std::ldexp(1024 + fraction, exponent - 25);
-        return bits & 0x8000 ? -magnitude : magnitude;
-    }
-};
 
 template <typename T>
 constexpr bool is_float = std::is_same_v<T, Half> || std::floating_point<T>;
@@ -334,6 +306,16 @@ std::vector<Row> float_rows() {
             const T product = y * std::floor(x / y);
             return x - product;
         }));
+        if constexpr (std::is_same_v<T, float>)
+            rows.push_back(unary<T>("OpQuantizeToF16", [](T x) {
+                const Half half(x);
+                // Denormal halves are none of the values that it gives.
+                return std::abs(half) < 0x1p-14 ? std::copysign(T(0), x) : static_cast<T>(static_cast<double>(half));
+            }));
+        rows.push_back(extended<T>("InverseSqrt", 1, [](T x, T, T) {
+            const T root = std::sqrt(x);
+            return T(1) / root;
+        }));
         rows.push_back(extended<T>("Fma", 3, [](T x, T y, T z) { return std::fma(x, y, z); }));
         rows.push_back(unary<T, Half>("OpFConvert", [](T x) { return Half(static_cast<float>(x)); }));
     }
@@ -533,22 +515,24 @@ bool is_nan(const std::string& type, Word word) {
 template <typename T>
 void check(const std::vector<Row>& rows, const std::vector<Word>& edges) {
     ASSERT_EQ(edges.size(), 16u);
-    const ComputeRunner runner{.spec = "cpu:consistent", .result_words = static_cast<std::uint32_t>(rows.size() * 512)};
-    const auto found = runner.run_assembly(module_of<T>(rows, edges), 0x10300);
-    ASSERT_TRUE(found) << found.error().message();
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-        int wrong = 0;
-        for (std::size_t at = 0; at < 256 && wrong < 3; ++at) {
-            const Word x = edges[at / 16], y = edges[at % 16], z = edges[(at / 16 + at % 16) % 16];
-            const Word value = (*found)[i * 512 + at] | Word{(*found)[i * 512 + 256 + at]} << 32,
-                       expected = rows[i].expected(x, y, z);
-            const std::string& type = rows[i].result;
-            if (value == expected || (is_nan(type, value) && is_nan(type, expected))) continue;
-            const Word sign = type[0] == 'f' ? Word{1} << (std::stoi(type.substr(1)) - 1) : 0;
-            if (rows[i].either_zero && (value & ~sign) == 0 && (expected & ~sign) == 0) continue;
-            ADD_FAILURE() << rows[i].text
-                          << fmt::format(" of {:#x}, {:#x}, {:#x}: {:#x}, not {:#x}", x, y, z, value, expected);
-            ++wrong;
+    for (const char* spec : {"cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16"}) {
+        const ComputeRunner runner{.spec = spec, .result_words = static_cast<std::uint32_t>(rows.size() * 512)};
+        const auto found = runner.run_assembly(module_of<T>(rows, edges), 0x10300);
+        ASSERT_TRUE(found) << found.error().message();
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            int wrong = 0;
+            for (std::size_t at = 0; at < 256 && wrong < 3; ++at) {
+                const Word x = edges[at / 16], y = edges[at % 16], z = edges[(at / 16 + at % 16) % 16];
+                const Word value = (*found)[i * 512 + at] | Word{(*found)[i * 512 + 256 + at]} << 32,
+                           expected = rows[i].expected(x, y, z);
+                const std::string& type = rows[i].result;
+                if (value == expected || (is_nan(type, value) && is_nan(type, expected))) continue;
+                const Word sign = type[0] == 'f' ? Word{1} << (std::stoi(type.substr(1)) - 1) : 0;
+                if (rows[i].either_zero && (value & ~sign) == 0 && (expected & ~sign) == 0) continue;
+                ADD_FAILURE() << spec << ", " << rows[i].text
+                              << fmt::format(" of {:#x}, {:#x}, {:#x}: {:#x}, not {:#x}", x, y, z, value, expected);
+                ++wrong;
+            }
         }
     }
 }

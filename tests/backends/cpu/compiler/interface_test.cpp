@@ -144,6 +144,28 @@ TEST_P(Interface, InterpolatesAtPlacesInPixels) {
 }
 
 // The number of the instruction Sqrt is that of the output block's id: none of its distances is written for that.
+TEST_P(Interface, DemotedInvocationsHelpTheirNeighborsAndWriteNothing) {
+    const auto words = draw(GetParam(), corner + "void main() { gl_Position = corner(); }", R"(
+        #extension GL_EXT_demote_to_helper_invocation : require
+        layout(location = 0) out uvec4 color;
+        void main() {
+            bool before = helperInvocationEXT();
+            if (int(gl_FragCoord.x) == 1) demote;
+            float after = helperInvocationEXT() ? 1.0 : 0.0;
+            float slope = dFdxFine(gl_FragCoord.x * 3.0), change = dFdxFine(after);
+            color = uvec4(before ? 2u : 1u, uint(slope), uint(change + 4.0), 9u);
+        })");
+    ASSERT_TRUE(words) << words.error().message();
+    for (std::uint32_t i = 0; i < side * side; ++i) {
+        const std::vector<std::uint32_t> pixel(words->begin() + i * 4, words->begin() + i * 4 + 4);
+        const std::uint32_t x = i % side;
+        if (x == 1)
+            EXPECT_EQ(pixel, (std::vector<std::uint32_t>{0, 0, 0, 0})) << i;
+        else
+            EXPECT_EQ(pixel, (std::vector<std::uint32_t>{1, 3, x == 0 ? 5u : 4u, 9})) << i;
+    }
+}
+
 TEST(InterfaceOfForeignModules, NumbersThatLookLikeAnOutputDoNotWriteIt) {
     const char* const text = R"(
         OpCapability Shader

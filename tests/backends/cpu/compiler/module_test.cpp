@@ -499,6 +499,85 @@ TEST_P(ForeignModule, DotProductsOfIntegers) {
     }, 256);
 }
 
+TEST_P(ForeignModule, SaturatingDotProductsStopAtTheEnds) {
+    const std::string text = assembly_head(R"(
+        OpCapability Shader
+        OpCapability DotProduct
+        OpCapability DotProductInput4x8BitPacked
+        OpExtension "SPV_KHR_integer_dot_product"
+    )", R"(
+        %near_end = OpConstant %uint 4294960000
+        %least = OpConstant %int -2147480000
+        %threes = OpConstant %uint 50529027
+        %most = OpConstant %uint 4294967295
+        %highest = OpConstant %uint 2155905152
+        %main = OpFunction %void None %main_type
+        %start = OpLabel
+        %id = OpLoad %uint %index
+        %packed = OpIMul %uint %id %threes
+        %unsigned_sum = OpUDotAccSat %uint %packed %most %near_end PackedVectorFormat4x8Bit
+        %mixed_sum = OpSUDotAccSat %int %highest %packed %least PackedVectorFormat4x8Bit
+        %mixed_bits = OpBitcast %uint %mixed_sum
+        %two = OpIMul %uint %id %c2
+        %place = OpIAdd %uint %two %c1
+        %out_0 = OpAccessChain %pointer %result %c0 %two
+        %out_1 = OpAccessChain %pointer %result %c0 %place
+        OpStore %out_0 %unsigned_sum
+        OpStore %out_1 %mixed_bits
+        OpReturn
+        OpFunctionEnd
+    )", false);
+    // Four bytes of 3 * id; times 255 as unsigned, times -128 as signed ones.
+    static_assert(50529027 == 0x03030303 && 2155905152 == 0x80808080);
+    expect(ComputeRunner{GetParam(), 128}.run_assembly(text, 0x10300), [](std::uint32_t at) {
+        const std::int64_t byte = at / 2 * 3;
+        if (at % 2 == 0) return static_cast<std::uint32_t>(std::min<std::int64_t>(4294960000 + 4 * 255 * byte, 0xffffffff));
+        return static_cast<std::uint32_t>(std::max<std::int64_t>(-2147480000 - 4 * 128 * byte, -2147483648));
+    }, 128);
+}
+
+TEST_P(ForeignModule, FormsThatGlslDoesNotMake) {
+    std::string text = assembly_head(R"(
+        OpCapability Shader
+        OpCapability VariablePointers
+        OpCapability VariablePointersStorageBuffer
+    )", R"(
+        %array = OpTypeArray %uint %c3
+        %array_pointer = OpTypePointer Function %array
+        %local_pointer = OpTypePointer Function %uint
+        %none = OpConstantNull %array
+        %semantics = OpConstant %uint 72
+        %main = OpFunction %void None %main_type
+        %start = OpLabel
+        %first = OpVariable %array_pointer Function %none
+        %second = OpVariable %array_pointer Function
+        %id = OpLoad %uint %index
+        %in = OpAccessChain %pointer %numbers %c0 %id
+        %out = OpAccessChain %pointer %result %c0 %id
+        %slot = OpAccessChain %local_pointer %first %c2
+        OpCopyMemory %slot %in
+        OpCopyMemory %second %first
+        %other = OpAccessChain %local_pointer %second %c2
+        OpCopyMemory %out %other
+        %next = OpPtrAccessChain %pointer %in %c3
+        %more = OpLoad %uint %next
+        OpMemoryBarrier %c1 %semantics
+        %old = OpLoad %uint %out
+        %sum = OpIAdd %uint %old %more
+        OpAtomicStore %out %c1 %c0 %sum
+        OpReturn
+        OpFunctionEnd
+    )", false);
+    const auto replace = [&](const std::string& what, const std::string& with) {
+        ASSERT_NE(text.find(what), std::string::npos);
+        text.replace(text.find(what), what.size(), with);
+    };
+    // One decoration for both.
+    replace("OpDecorate %result DescriptorSet 0", "OpDecorate %in_set DescriptorSet 0\n%in_set = OpDecorationGroup");
+    replace("OpDecorate %numbers DescriptorSet 0", "OpGroupDecorate %in_set %result %numbers");
+    expect(ComputeRunner{GetParam()}.run_assembly(text, 0x10300), [](std::uint32_t id) { return id + id + 3; });
+}
+
 TEST_P(ForeignModule, SwitchesOnEightSixteenAndSixtyFourBits) {
     const auto module_for = [](int bits, const std::string& capability, const std::string& big) {
         return assembly_head("OpCapability Shader\nOpCapability " + capability + "\n", fmt::format(R"(
@@ -586,7 +665,7 @@ TEST(Subgroups, HaveSixteenLanesWhereArithmeticIsConsistent) {
         layout(set = 0, binding = 1) readonly buffer Numbers { uint n[]; };
         void main() {
             uint id = n[gl_LocalInvocationIndex];
-            uint at = id * 8u;
+            uint at = id * 9u;
             result[at] = subgroupAdd(id);
             result[at + 1u] = subgroupInclusiveMul(id % 3u + 1u);
             result[at + 2u] = subgroupShuffleXor(id, 9u);
@@ -595,28 +674,32 @@ TEST(Subgroups, HaveSixteenLanesWhereArithmeticIsConsistent) {
             result[at + 5u] = gl_SubgroupSize;
             result[at + 6u] = gl_SubgroupInvocationID + 100u * gl_SubgroupID + 1000u * gl_NumSubgroups;
             if (id % 5u < 2u) result[at + 7u] = subgroupAdd(1u); else result[at + 7u] = subgroupMin(id);
+            result[at + 8u] = subgroupExclusiveAdd(id + 1u);
         }
     )";
     for (const char* spec : lane_specs) {
-        const auto words = ComputeRunner{spec, 512}.run_glsl(text);
+        const auto words = ComputeRunner{spec, 576}.run_glsl(text);
         ASSERT_TRUE(words) << words.error().message();
         for (std::uint32_t id = 0; id < 64; ++id) {
             const std::uint32_t first = id / 16 * 16;
             const auto over = [&](const std::function<void(std::uint32_t)>& visit) {
                 for (std::uint32_t i = first; i < first + 16; ++i) visit(i);
             };
-            std::uint32_t sum = 0, product = 1, ballot = 0, most = 0, few = 0, least = ~0u;
+            std::uint32_t sum = 0, product = 1, ballot = 0, most = 0, few = 0, least = ~0u, before = 0;
             over([&](std::uint32_t i) {
                 sum += i;
                 if (i <= id) product *= i % 3 + 1;
                 if (i % 3 == 0) ballot |= 1u << (i - first);
+                if (i < id) before += i + 1;
                 if (i / 8 == id / 8) most = std::max(most, i * 37 % 64);
                 if (i % 5 < 2) ++few;
                 else least = std::min(least, i);
             });
-            const std::uint32_t expected[] = {sum, product, id ^ 9, ballot, most, 16, id % 16 + 100 * (id / 16) + 4000,
-                                              id % 5 < 2 ? few : least};
-            for (std::size_t i = 0; i < 8; ++i) ASSERT_EQ((*words)[id * 8 + i], expected[i]) << spec << " invocation " << id << " value " << i;
+            const std::uint32_t expected[] = {
+                sum,   product, id ^ 9, ballot, most, 16, id % 16 + 100 * (id / 16) + 4000, id % 5 < 2 ? few : least,
+                before};
+            for (std::size_t i = 0; i < 9; ++i)
+                ASSERT_EQ((*words)[id * 9 + i], expected[i]) << spec << " invocation " << id << " value " << i;
         }
     }
 }

@@ -43,8 +43,9 @@ FaultBench::FaultBench(const std::string& backend) {
         const std::scoped_lock lock(mutex_);
         messages_.push_back(message);
     });
-    constexpr rhi::BufferUsage buffer_usage =
-        rhi::BufferUsage::storage | rhi::BufferUsage::copy_source | rhi::BufferUsage::copy_destination;
+    constexpr rhi::BufferUsage buffer_usage = rhi::BufferUsage::storage | rhi::BufferUsage::uniform_texel |
+                                              rhi::BufferUsage::storage_texel | rhi::BufferUsage::copy_source |
+                                              rhi::BufferUsage::copy_destination;
     using enum rhi::TextureUsage;
     output = ok(device_->create_buffer({.size = 1024, .usage = buffer_usage, .name = "output"}));
     input = ok(device_->create_buffer({.size = 256, .usage = buffer_usage, .name = "input"}));
@@ -86,6 +87,9 @@ rhi::BindGroup FaultBench::bind(rhi::BindGroupLayout layout) {
         if (binding.binding == 3) entry.texture = rhi::TextureView{numbers};
         if (binding.binding == 5) entry.texture = rhi::TextureView{target}, entry.sampler = nearest;
         if (binding.binding == 4) entry.sampler = nearest;
+        if (binding.binding == 6) entry.buffer = output;
+        if (binding.binding == 7) entry.buffer = input;
+        if (binding.binding >= 6) entry.format = rhi::Format::r32_uint;
         group.entries.push_back(entry);
     }
     return ok(device_->create_bind_group(group));
@@ -109,15 +113,23 @@ Expected<void> FaultBench::compute(const std::string& path, const std::string& t
     return submit(std::move(list));
 }
 
-Expected<void> FaultBench::draw(const std::string& path, const std::string& text, const std::string& vertex_text,
-                                rhi::LoadOperation load) {
+rhi::GraphicsPipeline FaultBench::make_graphics(const std::string& path, const std::string& text,
+                                                const std::string& vertex_text, const rhi::VertexBufferLayout& layout,
+                                                std::vector<rhi::VertexAttribute> attributes) {
     rhi::GraphicsPipelineDesc desc;
     desc.vertex = make_shader(vertex_text.empty() ? "whole.vert" : path + ".vert",
                               vertex_text.empty() ? whole_triangle : vertex_text);
     desc.fragment = make_shader(path, text);
+    if (!attributes.empty()) desc.vertex_buffers = {layout};
+    desc.vertex_attributes = std::move(attributes);
     desc.color_targets = {{.format = rhi::Format::rgba32_float}};
     desc.name = path;
-    const rhi::GraphicsPipeline pipeline = ok(device_->create_graphics_pipeline(desc));
+    return ok(device_->create_graphics_pipeline(desc));
+}
+
+Expected<void> FaultBench::draw(const std::string& path, const std::string& text, const std::string& vertex_text,
+                                rhi::LoadOperation load) {
+    const rhi::GraphicsPipeline pipeline = make_graphics(path, text, vertex_text);
     rhi::CommandList list = device_->create_command_list("once");
     rhi::RenderPassDesc pass;
     pass.color = {{.view = rhi::TextureView{target}, .load = load}};

@@ -16,7 +16,8 @@ namespace nacre::cpu {
 ///
 /// Set 0 of compute shaders: binding 0 buffer 'output' (256 words, nothing has written them), 1 buffer 'input' (64
 /// words, 0 to 63), 2 image 'picture' (8x8 words, nothing has written them), 3 texture 'numbers' (8x8 words, 0 to 63),
-/// 4 sampler 'nearest', 5 texture 'target'. Shaders declare what they use.
+/// 4 sampler 'nearest', 5 texture 'target', 6 texel buffer of the words of 'output', 7 texel buffer of those of 'input'.
+/// Shaders declare what they use.
 class FaultBench {
   public:
     explicit FaultBench(const std::string& backend);
@@ -28,6 +29,10 @@ class FaultBench {
                         rhi::LoadOperation load = rhi::LoadOperation::clear);
     Expected<void> submit(rhi::CommandList list);
     rhi::ComputePipeline make_compute(const std::string& path, const std::string& text);
+    /// Draws to 'target'; the vertex shader covers all of it where no text is given.
+    rhi::GraphicsPipeline make_graphics(const std::string& path, const std::string& text,
+                                        const std::string& vertex_text = {}, const rhi::VertexBufferLayout& layout = {},
+                                        std::vector<rhi::VertexAttribute> attributes = {});
     rhi::BindGroup bind(rhi::ComputePipeline pipeline);
     rhi::BindGroup bind(rhi::BindGroupLayout layout);
 

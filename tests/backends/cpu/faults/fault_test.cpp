@@ -105,6 +105,36 @@ void main() {
     imageStore(picture, at - ivec2(0, 1), uvec4(1u)); // FAULT
 })",
      "N-804", "texture 'picture'", "invocation (0, 0, 0)"},
+    {"TrapTexelRange", "traps", "texels.comp", R"(layout(local_size_x = 8) in;
+layout(set = 0, binding = 7) uniform usamplerBuffer numbers;
+layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
+void main() {
+    int i = int(gl_GlobalInvocationID.x);
+    result.words[i] = texelFetch(numbers, i * 10).x; // FAULT
+})",
+     "N-804", "'numbers' (buffer 'input')", "invocation (7, 0, 0)"},
+    {"SanitizeTexelRange", "sanitize", "texel_image.comp", R"(layout(local_size_x = 8) in;
+layout(set = 0, binding = 6, r32ui) uniform writeonly uimageBuffer words;
+void main() {
+    imageStore(words, int(gl_GlobalInvocationID.x) * 64 - 192, uvec4(1u)); // FAULT
+})",
+     "N-804", "'words' (buffer 'output')", "invocation (0, 0, 0)"},
+    {"SanitizeTexelUnwritten", "sanitize", "unwritten_texel.comp", R"(layout(local_size_x = 8) in;
+layout(set = 0, binding = 6, r32ui) uniform uimageBuffer words;
+void main() {
+    int i = int(gl_GlobalInvocationID.x);
+    imageStore(words, i, uvec4(3u));
+    uint next = imageLoad(words, i == 5 ? 100 : i).x;
+    if (next > 100u) imageStore(words, i + 200, uvec4(1u)); // FAULT
+})",
+     "N-805", "'words' (buffer 'output'), read at unwritten_texel.comp:6", "invocation (5, 0, 0)"},
+    {"SanitizeTexelRace", "sanitize", "texel_race.comp", R"(layout(local_size_x = 8) in;
+layout(set = 0, binding = 6, r32ui) uniform uimageBuffer words;
+void main() {
+    int i = int(gl_GlobalInvocationID.x);
+    imageStore(words, i / 2, uvec4(i)); // FAULT
+})",
+     "N-806", "'words' (buffer 'output')", "invocation (1, 0, 0)"},
     {"SanitizeBufferIndex", "sanitize", "index.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
 layout(set = 0, binding = 1) readonly buffer Input { uint words[64]; } numbers;
@@ -165,6 +195,53 @@ void main() {
     color = vec4(pow(x, 1.5)); // FAULT
 })",
      "N-801", "", "pixel (0, 0)"},
+    {"SanitizeSubgroupSum", "sanitize", "sum.comp", R"(#extension GL_KHR_shader_subgroup_arithmetic : require
+layout(local_size_x = 16) in;
+layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
+layout(set = 0, binding = 1) readonly buffer Input { uint words[64]; } numbers;
+void main() {
+    uint part;
+    if (numbers.words[gl_LocalInvocationIndex] != 2u) part = 1u;
+    uint sum = subgroupAdd(part);
+    result.words[gl_LocalInvocationIndex] = sum; // FAULT
+})",
+     "N-805", "'sum'", "invocation ("},
+    {"SanitizeSubgroupScan", "sanitize", "scan.comp", R"(#extension GL_KHR_shader_subgroup_arithmetic : require
+layout(local_size_x = 16) in;
+layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
+layout(set = 0, binding = 1) readonly buffer Input { uint words[64]; } numbers;
+void main() {
+    uint part;
+    uint i = gl_LocalInvocationIndex;
+    if (numbers.words[i] != 2u) part = 1u;
+    uint before = subgroupExclusiveAdd(part);
+    if (i < 3u) result.words[i] = before;
+    if (i == 3u) result.words[i] = before; // FAULT
+})",
+     "N-805", "'before'", "invocation (3, 0, 0)"},
+    {"SanitizeSubgroupShuffle", "sanitize", "shuffle.comp", R"(#extension GL_KHR_shader_subgroup_shuffle : require
+layout(local_size_x = 16) in;
+layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
+layout(set = 0, binding = 1) readonly buffer Input { uint words[64]; } numbers;
+void main() {
+    uint part;
+    uint i = gl_LocalInvocationIndex;
+    if (numbers.words[i] != 2u) part = i;
+    result.words[i] = subgroupShuffleXor(part, 1u); // FAULT
+})",
+     "N-805", "part", "invocation (3, 0, 0)"},
+    {"SanitizeSubgroupVote", "sanitize", "vote.comp", R"(#extension GL_KHR_shader_subgroup_vote : require
+layout(local_size_x = 16) in;
+layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
+layout(set = 0, binding = 1) readonly buffer Input { uint words[64]; } numbers;
+void main() {
+    bool is_large;
+    uint i = gl_LocalInvocationIndex;
+    if (numbers.words[i] != 1u) is_large = true;
+    bool all_large = subgroupAll(is_large);
+    result.words[i] = all_large ? 1u : 0u; // FAULT
+})",
+     "N-805", "'all_large'", "invocation (0, 0, 0)"},
 
     {"HostileWorkgroupMemory", "hostile", "workgroup.comp", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result;
@@ -257,6 +334,44 @@ std::vector<std::uint32_t> copy_with_statement(FaultBench& bench, const std::vec
     return read_words(bench, bench.output);
 }
 
+// Of three vertices the last one's y is never written, and w never, which no format asks for.
+TEST(CpuFaults, AnUndefinedVertexAttributeIsReported) {
+    for (const char* lanes : {"4", "8", "16"}) {
+        SCOPED_TRACE(lanes);
+        FaultBench bench(std::string("cpu:sanitize:lanes=") + lanes);
+        rhi::Device& device = bench.device();
+        const auto vertices =
+            device.create_buffer({.size = 3 * 16,
+                                  .usage = rhi::BufferUsage::vertex | rhi::BufferUsage::copy_destination,
+                                  .name = "corners"});
+        ASSERT_TRUE(vertices);
+        constexpr std::array<std::array<float, 3>, 3> corners{{{-1, -1, 0}, {3, -1, 0}, {-1, 3, 0}}};
+        for (std::uint32_t i = 0; i < 3; ++i)
+            ASSERT_TRUE(device.write_buffer(*vertices, std::span(corners[i]).first(i == 2 ? 1 : 3), i * 16));
+        const rhi::GraphicsPipeline pipeline = bench.make_graphics(
+            "corner.frag", "layout(location = 0) out vec4 color;\nvoid main() { color = vec4(1.0); }", R"(
+layout(location = 0) in vec3 corner;
+void main() {
+    gl_Position = vec4(corner.xy, 0.5, 1.0); // FAULT
+})",
+            {.stride = 16}, {{.location = 0, .format = rhi::Format::rgb32_float}});
+        rhi::CommandList list = device.create_command_list("once");
+        list.begin_render_pass(
+            {.color = {{.view = rhi::TextureView{bench.target}, .load = rhi::LoadOperation::clear}}, .name = "only"});
+        list.set_pipeline(pipeline);
+        list.set_vertex_buffer(0, *vertices);
+        list.draw({.vertex_count = 3});
+        list.end_render_pass();
+        ASSERT_TRUE(bench.submit(std::move(list)));
+        const std::vector<rhi::Message> messages = bench.messages();
+        ASSERT_EQ(messages.size(), 1u);
+        EXPECT_TRUE(messages[0].code.starts_with("N-805"));
+        EXPECT_THAT(messages[0].text, HasSubstr("corner.frag.vert:4"));
+        EXPECT_THAT(messages[0].text, HasSubstr("'corner' (buffer 'corners')"));
+        EXPECT_THAT(messages[0].text, HasSubstr("vertex 2"));
+    }
+}
+
 TEST(CpuFaults, UnknownChecksAreRefused) {
     std::vector<std::unique_ptr<rhi::Backend>> backends;
     backends.push_back(make_backend());
@@ -325,6 +440,44 @@ TEST(CpuHostile, AWriteThatIsNotStatedIsLost) {
     EXPECT_TRUE(messages[0].code.starts_with("N-821"));
     EXPECT_THAT(messages[0].text, HasSubstr("buffer 'output'"));
     EXPECT_EQ(words[5], 7u);
+}
+
+TEST(CpuHostile, TexelBuffersAreUsesOfTheirBuffer) {
+    const std::string text = R"(layout(local_size_x = 64) in;
+layout(set = 0, binding = 6, r32ui) uniform writeonly uimageBuffer words;
+layout(set = 0, binding = 7) uniform usamplerBuffer numbers;
+void main() {
+    int i = int(gl_GlobalInvocationID.x);
+    imageStore(words, i, texelFetch(numbers, i));
+})";
+    const auto copy = [&](FaultBench& bench, const std::vector<rhi::StatedAccess>& accesses) {
+        const rhi::ComputePipeline pipeline = bench.make_compute("texels.comp", text);
+        rhi::CommandList list = bench.device().create_command_list("frame");
+        list.fill_buffer(bench.output, 7u);
+        list.begin_statement("copy", accesses);
+        list.set_pipeline(pipeline);
+        list.set_bind_group(0, bench.bind(pipeline));
+        list.dispatch({});
+        list.end_statement();
+        EXPECT_TRUE(bench.submit(std::move(list)));
+        return read_words(bench, bench.output);
+    };
+    const rhi::StatedAccess write{.buffer = {}, .use = rhi::ResourceUse::storage_write};
+    FaultBench stated("cpu:hostile");
+    rhi::StatedAccess to = write;
+    to.buffer = stated.output;
+    auto words = copy(stated, {{.buffer = stated.input, .use = rhi::ResourceUse::sampled}, to});
+    EXPECT_TRUE(stated.messages().empty());
+    EXPECT_EQ(words[5], 5u);
+    FaultBench unstated("cpu:hostile");
+    to.buffer = unstated.output;
+    words = copy(unstated, {to});
+    const auto messages = unstated.messages();
+    const rhi::Message* message = find_message(messages, "N-821");
+    ASSERT_TRUE(message);
+    EXPECT_THAT(message->text, HasSubstr("buffer 'input'"));
+    EXPECT_THAT(message->text, HasSubstr("sampled"));
+    EXPECT_NE(words[5], 5u);
 }
 
 TEST(CpuHostile, NoOrderOfWorkgroupsIsReliedOn) {

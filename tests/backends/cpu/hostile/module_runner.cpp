@@ -179,6 +179,23 @@ Expected<BindGroupEntry> ModuleRunner::Objects::entry_for(const ReflectedBinding
             NACRE_TRY(entry.texture, view_for(binding));
             break;
         }
+        case BindingType::uniform_texel_buffer:
+        case BindingType::storage_texel_buffer:
+        case BindingType::readonly_storage_texel_buffer:
+        case BindingType::writeonly_storage_texel_buffer: {
+            const bool is_written = binding.type == BindingType::storage_texel_buffer ||
+                                    binding.type == BindingType::writeonly_storage_texel_buffer;
+            const std::uint64_t region = std::min<std::uint64_t>(regions.size(), region_count - 1);
+            entry.format = binding.image_format != Format::undefined ? binding.image_format
+                           : random.chance(50) && binding.sampled_kind == FormatKind::uint
+                               ? Format::r32_uint
+                               : format_of(binding.sampled_kind);
+            entry.buffer = is_written ? arena : read_arena;
+            entry.offset = first_region + region * region_stride;
+            entry.size = std::uint64_t{info(entry.format).block_bytes} * random.pick({1u, 3u, 8u, 16u});
+            regions.emplace_back(entry.offset, entry.offset + entry.size);
+            break;
+        }
         case BindingType::acceleration_structure: entry.acceleration_structure = top; break;
     }
     return entry;
@@ -203,7 +220,8 @@ Expected<void> ModuleRunner::make_device() {
     at.content.resize(arena_bytes / 4);
     for (std::uint32_t& word : at.content)
         word = random.chance(50) ? static_cast<std::uint32_t>(random.below(40)) : static_cast<std::uint32_t>(random.next());
-    const auto usage = BufferUsage::storage | BufferUsage::uniform | BufferUsage::vertex | BufferUsage::copy_source | BufferUsage::copy_destination;
+    const auto usage = BufferUsage::storage | BufferUsage::uniform | BufferUsage::uniform_texel | BufferUsage::storage_texel |
+                       BufferUsage::vertex | BufferUsage::copy_source | BufferUsage::copy_destination;
     NACRE_TRY(at.arena, device.create_buffer({.size = arena_bytes, .usage = usage, .name = "arena"}));
     NACRE_CHECK(device.write_buffer(at.arena, std::span<const std::uint32_t>(at.content)));
     NACRE_TRY(at.read_arena, device.create_buffer({.size = arena_bytes, .usage = usage, .name = "read arena"}));

@@ -57,6 +57,26 @@ void main() {
     result.items[1].inner[1].b[i] = i;
 }
 )"},
+    {"texels.comp", R"(
+#extension GL_EXT_nonuniform_qualifier : require
+layout(local_size_x = 16) in;
+layout(set = 0, binding = 0) buffer Result { uvec4 result[]; };
+layout(set = 0, binding = 1) uniform samplerBuffer reals;
+layout(set = 0, binding = 2) uniform usamplerBuffer words[3];
+layout(set = 0, binding = 3, r32ui) uniform uimageBuffer counters;
+layout(set = 0, binding = 4, rgba16f) uniform imageBuffer halves;
+layout(set = 0, binding = 5, r32i) uniform readonly iimageBuffer numbers;
+void main() {
+    uint id = gl_LocalInvocationIndex;
+    int at = imageLoad(numbers, int(id)).x;
+    vec4 real = texelFetch(reals, at) + texelFetch(reals, textureSize(reals) - 1 - int(id));
+    uvec4 word = texelFetch(words[nonuniformEXT(id % 3u)], int(id)) + texelFetch(words[1], at & 15);
+    uint old = imageAtomicAdd(counters, int(id) & 3, word.x) + imageAtomicCompSwap(counters, at, 2u, word.y);
+    if ((id & 1u) == 0u) imageStore(halves, int(id) / 2, real * 0.5);
+    imageStore(counters, imageSize(counters) - 1, uvec4(old));
+    result[id] = floatBitsToUint(imageLoad(halves, int(id))) + uvec4(old);
+}
+)"},
     {"flow.comp", R"(
 layout(local_size_x = 24) in;
 layout(set = 0, binding = 0) buffer Result { int result[]; };

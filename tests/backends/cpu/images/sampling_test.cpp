@@ -128,6 +128,48 @@ class Sampling : public testing::TestWithParam<Shape> {
     Random random{11};
 };
 
+// Patches of eight by two pixels, from far below a texel of the face apart to several of them: all lanes find their
+// texels in a few, or not.
+TEST(MagnifiedCube, IsFilteredLaneByLane) {
+    Random random{17};
+    const SamplerState sampler{{.magnify = rhi::Filter::linear, .minify = rhi::Filter::linear}};
+    const std::uint32_t flags = flags_of(ImageOperation::sample) | image_lod_explicit;
+    for (const Format format : {Format::rgba16_float, Format::rgba8_unorm}) {
+        for (const std::uint32_t size : {2u, 3u, 4u, 5u, 16u, 64u}) {
+            SCOPED_TRACE(testing::Message() << rhi::info(format).name << ", " << size << " texels");
+            const TestImage image({format, ViewDimension::cube, size, size, 1, 6}, random);
+            std::vector<Point> points;
+            for (int patch = 0; patch < 300; ++patch) {
+                const float texels = std::exp2(random_float(random, -6.0f, 1.0f));
+                const float step = texels * 2.0f / static_cast<float>(size);
+                const std::uint32_t axis = random_below(random, 3);
+                float base[3], dx[3], dy[3];
+                for (std::uint32_t i = 0; i < 3; ++i) {
+                    base[i] = i == axis ? (random_below(random, 2) == 0 ? -1.0f : 1.0f) : random_float(random, -1, 1);
+                    dx[i] = step * random_float(random, -1, 1), dy[i] = step * random_float(random, -1, 1);
+                }
+                for (std::uint32_t lane = 0; lane < 16; ++lane) {
+                    Point& point = points.emplace_back();
+                    const auto x = static_cast<float>(lane % 8), y = static_cast<float>(lane / 8);
+                    for (std::uint32_t i = 0; i < 3; ++i)
+                        point.coordinates[i] = std::bit_cast<std::uint32_t>(base[i] + x * dx[i] + y * dy[i]);
+                }
+            }
+            const auto results = run_points(image_function(16), 16, &image.view, &sampler, {.flags = flags}, points);
+            const auto of_four = run_points(image_function(4), 4, &image.view, &sampler, {.flags = flags}, points);
+            ReferenceSampler reference(image, sampler.desc);
+            for (std::size_t i = 0; i < points.size(); ++i) {
+                ASSERT_EQ(results[i], of_four[i]) << "point " << i;
+                const ReferenceResult expected =
+                    reference.sample(flags, std::span(points).subspan(i & ~std::size_t{3}).first<4>(), i & 3);
+                for (int c = 0; c < 4 && !expected.is_ambiguous; ++c)
+                    ASSERT_NEAR(std::bit_cast<float>(results[i][c]), expected.value[c], 2e-4)
+                        << "point " << i << " channel " << c;
+            }
+        }
+    }
+}
+
 // Every lane of one call must have its own level: shapes that fit into one mip have none.
 constexpr std::uint32_t every_lod[] = {image_lod_explicit, image_lod_implicit, image_lod_gradient,
                                        image_lod_implicit | image_min_lod};

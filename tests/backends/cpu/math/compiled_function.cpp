@@ -121,7 +121,19 @@ void make_loop(llvm::Module& module, const Variant& variant, const std::vector<K
 std::string Variant::name() const {
     return std::to_string(lanes) + " lanes, " + (processor.empty() ? "host" : processor) +
            (options.contract ? ", contract" : "") + (options.half_instructions ? ", half instructions" : "") +
+           (options.exponent_instructions ? ", exponent instructions" : "") +
            (optimized ? ", optimized" : "");
+}
+
+std::vector<Variant> measured_variants() {
+    std::vector<Variant> variants{{.optimized = true}, {.options = {.contract = true}, .optimized = true}};
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx512vl"))
+        for (const unsigned lanes : {16u, 8u, 4u, 1u})
+            variants.push_back(
+                {.lanes = lanes, .options = {.contract = true, .exponent_instructions = true}, .optimized = true});
+#endif
+    return variants;
 }
 
 std::vector<Variant> exact_variants() {

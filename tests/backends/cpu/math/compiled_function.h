@@ -26,6 +26,10 @@ struct Variant {
     std::string name() const;
 };
 
+/// The variants whose accuracy is measured: with and without contraction, and with the instructions that the processor
+/// at hand has.
+std::vector<Variant> measured_variants();
+
 /// The variants whose results have to agree in every bit: lane counts, targets, with and without optimization.
 std::vector<Variant> exact_variants();
 

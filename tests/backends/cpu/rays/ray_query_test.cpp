@@ -3,6 +3,8 @@
 // them, against every triangle in double precision.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -342,6 +344,52 @@ TEST_P(CpuRayQueries, RaysThatTerminateHitSomethingThatCounts) {
         if (expected.margin < 1e-4) continue;
         ASSERT_EQ(occluded[i].type, expected.closest.exists() ? 1u : 0u) << "ray " << i;
         hit_count += occluded[i].type;
+    }
+    EXPECT_GT(hit_count, 100u);
+}
+
+TEST_P(CpuRayQueries, QueriesTellWhatTheyWereGivenAndEndWhenTold) {
+    const ReferenceScene scene = random_scene(9, 16);
+    world.build(scene);
+    std::vector<ReferenceRay> rays = random_rays(1000, 10, true);
+    // Without opaque triangles, so that each one is a candidate.
+    for (ReferenceRay& ray : rays) ray.flags = 2;
+    const std::string text = R"(
+        void main() {
+            uint i = gl_GlobalInvocationID.x;
+            if (i >= rays.length()) return;
+            rayQueryEXT query;
+            rayQueryInitializeEXT(query, scene, rays[i].flags.x, rays[i].flags.y, rays[i].origin, rays[i].t_min,
+                                  rays[i].direction, rays[i].t_max);
+            uint steps = 0u;
+            while (rayQueryProceedEXT(query)) {
+                ++steps;
+                rayQueryConfirmIntersectionEXT(query);
+                rayQueryTerminateEXT(query);
+            }
+            uvec3 origin = floatBitsToUint(rayQueryGetWorldRayOriginEXT(query)),
+                  direction = floatBitsToUint(rayQueryGetWorldRayDirectionEXT(query));
+            hits[i] = Hit(uvec4(rayQueryGetRayFlagsEXT(query), floatBitsToUint(rayQueryGetRayTMinEXT(query)), origin.xy),
+                          uvec4(origin.z, direction),
+                          uvec4(steps, rayQueryGetIntersectionTypeEXT(query, true), rayQueryProceedEXT(query), 0));
+        })";
+    const std::vector<Hit> hits = world.trace(rays, declarations.substr(0, declarations.find("void store")) + text);
+    std::size_t hit_count = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        std::array<std::uint32_t, 12> found;
+        std::memcpy(found.data(), &hits[i], sizeof found);
+        std::array<std::uint32_t, 8> given{2, std::bit_cast<std::uint32_t>(rays[i].t_min)};
+        std::memcpy(&given[2], &rays[i].origin, 12);
+        std::memcpy(&given[5], &rays[i].direction, 12);
+        for (std::size_t word = 0; word < given.size(); ++word)
+            ASSERT_EQ(found[word], given[word]) << "ray " << i << ", word " << word;
+        ASSERT_LE(found[8], 1u) << "ray " << i << " went on after its end";
+        ASSERT_EQ(found[9], found[8]) << "ray " << i;
+        ASSERT_EQ(found[10], 0u) << "ray " << i;
+        const ReferenceAnswer expected = trace(scene, rays[i], [](const ReferenceHit&) { return true; });
+        if (expected.margin < 1e-4) continue;
+        ASSERT_EQ(found[8], expected.closest.exists() ? 1u : 0u) << "ray " << i;
+        hit_count += found[8];
     }
     EXPECT_GT(hit_count, 100u);
 }

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "materials/builtin_materials.h"
+#include "materials/evaluation.h"
+#include "materials/storage.h"
+#include "passes/gbuffer_layout.h"
+#include "scene/builtin.h"
+#include "scene/shapes.h"
+#include "scene/tangents.h"
+#include "tests/passes/renderer_test.h"
+
+namespace nacre::test {
+namespace {
+
+using materials::closures::Library;
+
+RENDERER_SUITE(Closures);
+
+constexpr std::uint32_t side = 64;
+
+materials::MaterialDescription described(std::string_view name) {
+    materials::MaterialDescription material{.name = std::string(name)};
+    material.tree = std::make_shared<const materials::Tree>(*materials::make_builtin_material(name));
+    return material;
+}
+
+scene::Primitive ball() {
+    scene::Primitive result = scene::sphere(0.9f, 128, 64);
+    const std::vector<glm::vec2> uv = result.uv0;
+    scene::add_tangents(result, uv);
+    return result;
+}
+
+// The frame that the reader of stored frames makes of a normal, written apart from it: its tangent is x turned by the
+// shortest rotation from +z (or -z) to the normal.
+glm::dmat3 frame_of(const glm::dvec3& normal, double angle) {
+    const double side_of = normal.z >= 0.0 ? 1.0 : -1.0;
+    const glm::dvec3 pole(0.0, 0.0, side_of), axis = glm::cross(pole, normal);
+    const double cosine = glm::dot(pole, normal);
+    const auto turned = [&](const glm::dvec3& v) {
+        return cosine * v + glm::cross(axis, v) + axis * (glm::dot(axis, v) / (1.0 + cosine));
+    };
+    const glm::dvec3 x = turned({1.0, 0.0, 0.0}), y = turned({0.0, side_of, 0.0});
+    return {std::cos(angle) * x + std::sin(angle) * y, std::cos(angle) * y - std::sin(angle) * x, normal};
+}
+
+// Every pixel of lit balls against the closures evaluated in double precision from the same words.
+TEST_P(Closures, LightingAgreesWithWhatIsStored) {
+    Library library;
+    const passes::Field normal_field = *std::ranges::find(passes::gbuffer_fields(), "normal", &passes::Field::name);
+    const passes::Field roughness_field = *std::ranges::find(passes::gbuffer_fields(), "roughness", &passes::Field::name);
+    for (const char* name : {"complex-coat", "silks-under-plastic", "single-sss"}) {
+        scene::Scene scene = empty_scene();
+        place(scene, ball(), add_material(scene, described(name)));
+        scene::Light sun = directional_light({-0.4f, -0.8f, -1.0f}, 2.0f);
+        sun.casts_shadows = false;
+        scene.lights.push_back(sun);
+        const Shot shot = render(scene, {.width = side, .height = side, .exposure_ev = 0.0f, .keep_intermediates = true});
+        const auto words_0 = shot.intermediate<std::uint32_t>("material.0"), words_1 = shot.intermediate<std::uint32_t>("material.1");
+        const auto tops = shot.intermediate<std::uint32_t>("top_layer");
+        std::vector<std::vector<std::uint32_t>> slices;
+        for (const passes::IntermediateDescription& description : shot.renderer->intermediates()) {
+            for (std::uint32_t i = 0; description.name == "material.slices" && i < description.layers; ++i) {
+                slices.push_back(shot.intermediate<std::uint32_t>("material.slices", i));
+            }
+        }
+        if (GetParam().profile == "mobile") {
+            EXPECT_TRUE(slices.empty()) << "a profile without storage images must do with the color targets";
+            for (const std::uint32_t word : words_0) EXPECT_NE(word & 3u, 3u);
+            continue;
+        }
+        const glm::dvec3 to_light = -glm::dvec3(sun.direction), to_viewer(0.0, 0.0, 1.0);
+        int compared = 0;
+        double worst = 0.0;
+        for (std::uint32_t i = 0; i < words_0.size(); ++i) {
+            if ((words_0[i] & 3u) != 3u) continue;
+            materials::StoredPixel pixel{.words = {words_0[i], words_1[i]}};
+            for (const auto& slice : slices) pixel.words.push_back(slice[i]);
+            pixel.subsurface = pixel.words.back();
+            pixel.roughness = passes::decode_field(roughness_field, tops[i])[0];
+            const auto top = passes::decode_field(normal_field, tops[i]);
+            const auto material = materials::unpack_pixel(pixel);
+            ASSERT_TRUE(material) << material.error().message();
+            glm::dvec3 expected(0.0);
+            for (const materials::UnpackedClosure& stored : material->closures) {
+                const glm::dvec3 normal =
+                    stored.frame == 0 ? glm::dvec3(top[0], top[1], top[2]) : material->normals[stored.frame - 1];
+                const glm::dmat3 to_local = glm::transpose(frame_of(normal, material->tangent_angles[stored.frame]));
+                glm::dvec3 view = to_local * to_viewer;
+                view = glm::normalize(glm::dvec3(view.x, view.y, std::max(view.z, 1e-4)));
+                Library::Slab slab = stored.slab;
+                slab.roughness = std::max(slab.roughness, 0.045);
+                // 2 meters on 64 pixels.
+                const Library::Closure closure = library.cover_closure(library.prepare_closure(slab, view, 2.0 / side),
+                                                                       stored.path.spread, stored.path.under_interface);
+                const glm::dvec3 light = to_local * to_light;
+                const Library::ClosureValue value = library.evaluate_closure(closure, light);
+                expected += 2.0 * stored.path.weight * (value.specular + value.diffuse + value.subsurface) *
+                            library.top_transmittance(stored.path, std::max(light.z, 0.0));
+            }
+            const glm::vec3 seen = shot.radiance_at(i % side, i / side);
+            for (int channel = 0; channel < 3; ++channel) {
+                worst = std::max(worst, std::abs(seen[channel] - expected[channel]) / (expected[channel] + 0.01));
+            }
+            ++compared;
+        }
+        EXPECT_GT(compared, 2000) << name;
+        // Half floats have 11 bits; what is left is single precision.
+        EXPECT_LT(worst, 3e-3) << name;
+    }
+}
+
+// A clear pane before a glowing one: what shows through is what the closures say that the view keeps.
+TEST_P(Closures, WhatLiesBehindShowsThroughAsMuchAsTheTreeSays) {
+    materials::MaterialDescription glass{.name = "glass"};
+    glass.metallic = 0.0f;
+    glass.roughness = 0.3f;
+    glass.base_color = {0.5f, 0.25f, 1.0f, 1.0f};
+    glass.transmission = materials::Transmission{.factor = 1.0f};
+    materials::MaterialDescription glow{.name = "glow"};
+    glow.unlit = true;
+    scene::Scene scene = empty_scene();
+    place(scene, scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), add_material(scene, glow));
+    place(scene, scene::parallelogram({-1, -1, 1}, {2, 0, 0}, {0, 2, 0}), add_material(scene, glass));
+    const Shot shot = render(scene, {.width = 16, .height = 16, .exposure_ev = 0.0f});
+    // Straight down an interface of index 1.5 reflects about 4 percent, so that 0.96 of each channel's tint is left.
+    const glm::vec3 seen = shot.radiance_at(8, 8);
+    if (device().capabilities().dual_source_blending && GetParam().profile != "mobile") {
+        EXPECT_NEAR(seen.r, 0.96f * 0.5f, 0.02f);
+        EXPECT_NEAR(seen.g, 0.96f * 0.25f, 0.02f);
+        EXPECT_NEAR(seen.b, 0.96f * 1.0f, 0.02f);
+    } else {
+        EXPECT_NEAR(seen.g, 0.96f * 0.5833f, 0.02f);
+        EXPECT_NEAR(seen.r, seen.g, 1e-3f);
+    }
+}
+
+// A coat of no effect is the plain slab: closures and the single slab shade alike where their models are the same.
+TEST_P(Closures, LayersLeaveWhatTheyCover) {
+    scene::Scene scene = empty_scene();
+    materials::MaterialDescription metal{.name = "metal"};
+    metal.base_color = {0.9f, 0.6f, 0.3f, 1.0f};
+    metal.roughness = 0.5f;
+    const auto radiance = [&](const materials::MaterialDescription& material) {
+        scene::Scene one = scene;
+        place(one, ball(), add_material(one, material));
+        scene::Light sun = directional_light({-0.2f, -0.3f, -1.0f}, 2.0f);
+        sun.casts_shadows = false;
+        one.lights.push_back(sun);
+        one.environment = uniform_environment(glm::vec3(0.5f));
+        return render(one, {.width = 16, .height = 16, .exposure_ev = 0.0f}).radiance_at(9, 6);
+    };
+    materials::MaterialDescription barely = metal;
+    // Strength 0.01 stretches the lobe by nothing that can be seen, but takes the way through closures.
+    barely.anisotropy = materials::Anisotropy{.strength = 0.01f};
+    const glm::vec3 plain = radiance(metal), stretched = radiance(barely);
+    for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(stretched[channel], plain[channel], 0.03f * plain[channel]);
+}
+
+}  // namespace
+}  // namespace nacre::test
