@@ -58,7 +58,7 @@ TEST(CodeGeneration, EndsForJoinedMasksOfScalarConditions) {
     (*generator)->prepare(*module);
     const auto object = (*generator)->compile(*module, "masks", false);
     ASSERT_TRUE(object) << object.error().message();
-    EXPECT_FALSE(object->empty());
+    EXPECT_FALSE(object->bytes.empty());
 }
 
 }  // namespace
