@@ -33,11 +33,12 @@ set(public_headers
   materials/closures/octahedral.glsl materials/closures/stored_fields.glsl materials/closures/stored_frame.glsl
   materials/closures/table_textures.glsl materials/storage_shader.h
   materials/closures/thin_film.glsl materials/builtin_materials.h materials/description_tree.h materials/evaluation.h
+  materials/layering_error.h materials/random_walk.h materials/reference_stacks.h
   materials/preview.h materials/simplification.h materials/storage.h materials/topology.h materials/tree.h
   materials/tree_json.h materials/tree_shader.h
   scene/builtin.h scene/environment.h scene/load.h scene/scene.h scene/shapes.h scene/tangents.h
   passes/frame_graph.h passes/gbuffer_layout.h passes/plan.h passes/profiles.h passes/renderer.h
-  measure/comparison_page.h measure/cross_backend.h measure/flip.h measure/frame_times.h measure/image_metrics.h
+  measure/closure_comparison.h measure/comparison_page.h measure/cross_backend.h measure/flip.h measure/frame_times.h measure/image_metrics.h
   measure/numerical_error.h measure/report_page.h measure/texel_decoding.h measure/texture_comparison.h measure/tolerance.h)
 foreach(header IN LISTS public_headers)
   get_filename_component(folder "${header}" DIRECTORY)

@@ -184,7 +184,7 @@ struct RandomWalk::Model {
             const double albedo = slab.albedo[channel];
             const double alone = albedo / std::max(1.0 - inner + inner * albedo, 1e-12);
             leaf.single[channel] =
-                library.scattering_albedo(library.medium_similarity(alone, 1.0 - alone), slab.phase_anisotropy);
+                library.scattering_albedo(library.medium_dissimilarity(alone), slab.phase_anisotropy);
         }
         leaf.scatters = largest(leaf.single) > 0.0;
         return leaf;

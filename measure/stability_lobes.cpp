@@ -312,7 +312,7 @@ std::vector<StabilitySubject> lobe_subjects() {
     {
         auto& s = add(lobe_subject("medium", "What a layer of a medium reflects and lets through, at any depth.",
                                    "#include \"materials/closures/medium.glsl\"", R"(
-    Scattering s = medium_scattering(p.color.x, optical_depth(p.mean_free_path, p.distance), 0.99 * p.anisotropy, p.view.z);
+    Scattering s = medium_scattering(p.color.x, 1.0 - p.color.x, optical_depth(p.mean_free_path, p.distance), 0.99 * p.anisotropy, p.view.z);
     put(p.at, s.reflected);
     put(p.at + 1u, s.through);
     put(p.at + 2u, s.straight);

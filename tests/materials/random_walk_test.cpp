@@ -195,7 +195,7 @@ TEST(RandomWalk, AThinLayerScattersByThePhaseFunction) {
     slab.thickness = 1.0f;
     slab.mean_free_path = glm::vec3(static_cast<float>(1.0 / depth));
     slab.phase_anisotropy = g;
-    const double single = library.scattering_albedo(library.medium_similarity(0.5, 1.0 - 0.5), g);
+    const double single = library.scattering_albedo(library.medium_dissimilarity(0.5), g);
     const double backward = 0.5 * (1.0 - g) / g * ((1.0 + g) / std::sqrt(1.0 + g * g) - 1.0);
     const WalkAlbedo seen = RandomWalk(alone(slab)).albedo({0.0, 0.0, 1.0}, 1'000'000);
     // Scattering for the second time adds what is of the order of the depth.
