@@ -34,8 +34,9 @@ class CodeGenerator {
     virtual void prepare(llvm::Module& module) = 0;
     /// What became of a module.
     struct Object {
-        std::vector<std::byte> bytes;   ///< An object file for `load`.
-        std::uint64_t stack_bytes = 0;  ///< Of the frames of all its functions. Nothing calls itself, so it is the most.
+        std::vector<std::byte> bytes;  ///< An object file for `load`.
+        /// Of the frames of all its functions. Nothing calls itself, so it is the most.
+        std::uint64_t stack_bytes = 0;
     };
     /// Optimizes and translates.
     virtual Expected<Object> compile(llvm::Module& module, const std::string& name, bool has_coroutines) = 0;

@@ -94,7 +94,8 @@ class ShaderCompilation final : public Compiler {
     static constexpr std::uint64_t most_stack_bytes = 3 << 20;
 
     /// @param stack_bytes  what the code takes, where that is too much
-    Expected<ComputeProgram> compile_compute(const Variant& how, const ShaderSource& source, std::uint64_t& stack_bytes) {
+    Expected<ComputeProgram> compile_compute(const Variant& how, const ShaderSource& source,
+                                             std::uint64_t& stack_bytes) {
         ComputeProgram program;
         program.name = std::string(source.name);
         std::uint64_t workgroup_bytes = 0;
@@ -103,7 +104,8 @@ class ShaderCompilation final : public Compiler {
         std::vector<NarrowedOperation> narrowed;
         NACRE_TRY(program.code, compile(how, source, spv::ExecutionModel::GLCompute, {}, narrowed,
                                         [&](llvm::Module& target, const Module& module) {
-                                            ComputeEmitter emitter(target, module, how.options, how.generator->math_options(), source.slots);
+                                            ComputeEmitter emitter(target, module, how.options,
+                                                                   how.generator->math_options(), source.slots);
                                             emitter.trace_table = source.trace;
                                             emitter.emit();
                                             program.workgroup_size = module.workgroup_size;

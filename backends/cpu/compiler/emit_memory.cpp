@@ -42,7 +42,8 @@ LaneVariable& Emitter::make_lane_variable(Id variable_id, Id type_id, bool is_un
         variable_bytes += bytes;
         if (variable_bytes > most_variable_bytes)
             reject(fmt::format("the variables take {} bytes for {} lanes; {} is the most", variable_bytes, lanes, most_variable_bytes));
-        if (bytes > most_stack_bytes_of_one || stack_bytes + bytes > most_stack_bytes) made->memory = large_memory(bytes);
+        if (bytes > most_stack_bytes_of_one || stack_bytes + bytes > most_stack_bytes)
+            made->memory = large_memory(bytes);
         if (made->memory) return *made;
         stack_bytes += bytes;
         if (stack_bytes > most_stack_bytes && !is_on_heap())
