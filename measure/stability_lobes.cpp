@@ -336,8 +336,8 @@ std::vector<StabilitySubject> lobe_subjects() {
     put(p.at, medium_transmittance(p.mean_free_path, p.distance));
     put(p.at + 1u, medium_transmittance(transmittance_to_mean_free_path(max(p.color.x, 1e-6), max(p.random.x, 1e-6)),
                                         max(p.random.x, 1e-6)));
-    put(p.at + 2u, medium_albedo(medium_similarity(p.color.y)));
-    put(p.at + 3u, medium_similarity(p.color.y));
+    put(p.at + 2u, medium_albedo(medium_similarity(p.color.y, 1.0 - p.color.y)));
+    put(p.at + 3u, medium_similarity(p.color.y, 1.0 - p.color.y));
     put(p.at + 4u, medium_dissimilarity(p.color.y));
     put(p.at + 5u, scattering_albedo(medium_dissimilarity(p.color.y), 0.99 * p.anisotropy));)",
                                    std::vector<ResultKind>(6, share)));
