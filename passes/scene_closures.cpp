@@ -255,13 +255,12 @@ Expected<SceneClosures> SceneClosures::choose(const scene::Scene& scene, const P
             files->blend_path = fmt::format("passes/closures/blend_{}.frag", material.topology);
             result.texts_.push_back(std::move(files));
         }
-        result.tables_ |= 1u;
-        if ((material.features & materials::slab_medium) != 0) result.tables_ |= 2u;
-        if ((material.features & materials::slab_anisotropy) != 0) result.tables_ |= 4u;
+        for (std::uint32_t table = 0; table < closure_table_count; ++table) {
+            if (reads_table(material.features, table)) result.tables_ |= 1u << table;
+        }
         const bool is_deferred = !material.is_translucent && description.alpha_mode != materials::AlphaMode::blend;
         if (is_deferred && material.layout.storage_class != StorageClass::simple) {
             Lighting& lighting = result.lighting_;
-            lighting.any = true;
             for (std::size_t c = 0; c < material.layout.closures.size(); ++c) {
                 lighting.features |= material.layout.features[c];
                 if (material.layout.media[c] != materials::StoredMedium::opaque) lighting.features |= materials::slab_medium;
@@ -270,7 +269,6 @@ Expected<SceneClosures> SceneClosures::choose(const scene::Scene& scene, const P
             lighting.frames = std::max(lighting.frames, static_cast<std::uint32_t>(material.layout.frames.size()));
             lighting.has_subsurface |= material.layout.has_subsurface;
             lighting.slices = std::max(lighting.slices, material.layout.material_words() - 2);
-            lighting.bytes = std::max(lighting.bytes, material.layout.total_bytes());
         }
         result.materials_[i] = std::move(material);
     }

@@ -42,6 +42,11 @@ struct ClosureMaterial {
 
 /// Bindings of set 1 of these materials: the block, three tables, then textures.
 inline constexpr std::uint32_t closure_table_count = 3;  ///< Interface, medium, anisotropy.
+/// Whether closures with these features read a table.
+[[nodiscard]] constexpr bool reads_table(std::uint32_t features, std::uint32_t table) {
+    constexpr std::uint32_t needed_by[closure_table_count] = {0, materials::slab_medium, materials::slab_anisotropy};
+    return table == 0 || (features & needed_by[table]) != 0;
+}
 inline constexpr std::uint32_t first_closure_texture = 1 + closure_table_count;
 
 class SceneClosures {
@@ -60,19 +65,11 @@ class SceneClosures {
 
     /// What the lighting of stored closures must know of all opaque ones.
     struct Lighting {
-        bool any = false;                 ///< Some opaque material has a class above StorageClass::simple.
         std::uint32_t features = 0;       ///< As stored.
         std::uint32_t frames = 1;
         bool has_layers = false;          ///< Closures lie below others.
         bool has_subsurface = false;
         std::uint32_t slices = 0;         ///< Of the storage image: words beyond the second; last, subsurface data.
-        std::uint32_t bytes = 12;         ///< Largest of a pixel.
-
-        /// Whether shading what is stored reads a table (by number).
-        [[nodiscard]] bool reads_table(std::uint32_t table) const {
-            constexpr std::uint32_t needed_by[closure_table_count] = {~0u, materials::slab_medium, materials::slab_anisotropy};
-            return table == 0 || (features & needed_by[table]) != 0;
-        }
     };
     [[nodiscard]] const Lighting& lighting() const { return lighting_; }
     /// Which tables the materials' shaders read: bits 0 to 2 as closure_table_count tells.

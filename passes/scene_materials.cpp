@@ -144,9 +144,8 @@ Expected<void> SceneMaterials::add_closures(const scene::Scene& scene, std::uint
         const auto place = std::ranges::find(all_textures_, texture) - all_textures_.begin();
         result.textures.push_back(static_cast<std::uint32_t>(place));
     };
-    constexpr std::uint32_t needed_by[closure_table_count] = {~0u, materials::slab_medium, materials::slab_anisotropy};
     for (std::uint32_t i = 0; i < closure_table_count; ++i) {
-        if (i == 0 || (closures.features & needed_by[i]) != 0) add(1 + i, tables_[i], table_sampler_);
+        if (reads_table(closures.features, i)) add(1 + i, tables_[i], table_sampler_);
     }
     for (std::uint32_t i = 0; i < closures.textures.size(); ++i) {
         const materials::TextureReference& reference = closures.textures[i];

@@ -39,6 +39,16 @@ StoredFrame turned_frame(vec3 normal, float angle) {
     return frame;
 }
 
+vec3 to_frame(StoredFrame frame, vec3 v) {
+    return vec3(dot(v, frame.tangent), dot(v, frame.bitangent), dot(v, frame.normal));
+}
+
+// Views from behind a shading normal are moved onto the surface.
+vec3 view_in_frame(StoredFrame frame, vec3 to_viewer) {
+    vec3 view = to_frame(frame, to_viewer);
+    return normalize(vec3(view.xy, max(view.z, 1e-4)));
+}
+
 // normal: as the reader will have it.
 uint pack_tangent(vec3 normal, vec3 tangent, uint bits) {
     StoredFrame frame = frame_of_normal(normal);

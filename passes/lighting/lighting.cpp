@@ -50,7 +50,7 @@ class Lighting final : public RenderPass {
         if (decisions.closures) {
             pass.uses(resources_.material_slices, ResourceUse::sampled);
             for (std::uint32_t table = 0; table < closure_table_count; ++table) {
-                if (context.closures.lighting().reads_table(table)) {
+                if (reads_table(context.closures.lighting().features, table)) {
                     pass.uses(resources_.material_textures[context.materials.table_place(table)], ResourceUse::sampled);
                 }
             }
@@ -94,7 +94,7 @@ class Lighting final : public RenderPass {
                     bindings.push_back({.binding = binding, .type = rhi::BindingType::combined_texture_sampler});
                 };
                 for (std::uint32_t table = 0; table < closure_table_count; ++table) {
-                    if (context.closures.lighting().reads_table(table)) add(8 + table, context.materials.table(table));
+                    if (reads_table(context.closures.lighting().features, table)) add(8 + table, context.materials.table(table));
                 }
                 if (resources_.material_slices) add(11, graph.texture(resources_.material_slices));
             }

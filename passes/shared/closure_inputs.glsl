@@ -48,10 +48,7 @@ TreeState shade_surface(SurfaceFrames frames) {
     vec3 to_viewer = direction_to_viewer(in_position);
     vec3 views[tree_frame_count];
     for (uint i = 0u; i < tree_frame_count; ++i) {
-        StoredFrame frame = stored_frame(frames, i);
-        // Views from behind a shading normal are moved onto the surface.
-        float z = max(dot(to_viewer, frame.normal), 1e-4);
-        views[i] = normalize(vec3(dot(to_viewer, frame.tangent), dot(to_viewer, frame.bitangent), z));
+        views[i] = view_in_frame(stored_frame(frames, i), to_viewer);
     }
     return shade_tree(views, pixel_footprint(in_position));
 }

@@ -14,16 +14,6 @@ struct LitPoint {
     float occlusion; // of the environment
 };
 
-vec3 to_frame(StoredFrame frame, vec3 v) {
-    return vec3(dot(v, frame.tangent), dot(v, frame.bitangent), dot(v, frame.normal));
-}
-
-// Views from behind a shading normal are moved onto the surface.
-vec3 view_in_frame(StoredFrame frame, vec3 to_viewer) {
-    vec3 view = to_frame(frame, to_viewer);
-    return normalize(vec3(view.xy, max(view.z, 1e-4)));
-}
-
 #ifdef LIGHTS
 // Shares of the lights that arrive: the same for all closures of a pixel.
 struct LightVisibility {

@@ -6,13 +6,10 @@
 
 #include <cmath>
 #include <cstring>
-#include <memory>
 #include <random>
 
 #include "materials/builtin_materials.h"
 #include "materials/evaluation.h"
-#include "rhi/device.h"
-#include "samples/backends.h"
 #include "tests/materials/random_tree.h"
 #include "tests/materials/tree_run.h"
 
@@ -63,16 +60,8 @@ void main() {
         results[base + stored_words + 2u + channel] = floatBitsToUint(sum[channel]);
 })";
 
-class StorageShaderTest : public testing::TestWithParam<const char*> {
+class StorageShaderTest : public TreeDeviceTest {
   protected:
-    void SetUp() override {
-        static const rhi::Instance instance(all_backends());
-        auto device = instance.create_device({.backend = GetParam()});
-        if (!device && device.error().code == ErrorCode::not_found) GTEST_SKIP() << device.error().message();
-        ASSERT_TRUE(device) << device.error().message();
-        device_ = std::move(*device);
-    }
-
     void compare(const FlattenedTree& flat, std::mt19937& random) {
         const std::string name = topology_text(flat.visible_tree);
         const StorageLayout layout = storage_layout(flat, {.has_occlusion = true});
@@ -137,8 +126,6 @@ class StorageShaderTest : public testing::TestWithParam<const char*> {
         // Rounding differs only where a value lies next to a step.
         EXPECT_LT(codes_off, codes / 200 + 2) << name;
     }
-
-    std::unique_ptr<rhi::Device> device_;
 };
 
 TEST_P(StorageShaderTest, WritesAndReadsAsTheHostDoes) {
@@ -159,10 +146,7 @@ TEST_P(StorageShaderTest, BuiltinMaterials) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Backends, StorageShaderTest, testing::Values("cpu:consistent", "vulkan", "gl"),
-                         [](const auto& backend) {
-                             return std::string(backend.param).substr(0, std::string(backend.param).find(':'));
-                         });
+INSTANTIATE_TEST_SUITE_P(Backends, StorageShaderTest, testing::ValuesIn(TreeDeviceTest::backends), TreeDeviceTest::name_of);
 
 }  // namespace
 }  // namespace nacre::materials

@@ -8,6 +8,7 @@
 #include "materials/tables/interface_table.h"
 #include "materials/tables/medium_table.h"
 #include "rhi/shader_compiler.h"
+#include "samples/backends.h"
 
 namespace nacre::materials {
 namespace {
@@ -26,6 +27,19 @@ vec3 specular_lut(uint index, vec2 at) { return vec3(1.0); }
 )";
 
 }  // namespace
+
+std::string TreeDeviceTest::name_of(const testing::TestParamInfo<const char*>& backend) {
+    const std::string name = backend.param;
+    return name.substr(0, name.find(':'));
+}
+
+void TreeDeviceTest::SetUp() {
+    static const rhi::Instance instance(all_backends());
+    auto device = instance.create_device({.backend = GetParam()});
+    if (!device && device.error().code == ErrorCode::not_found) GTEST_SKIP() << device.error().message();
+    ASSERT_TRUE(device) << device.error().message();
+    device_ = std::move(*device);
+}
 
 std::vector<glm::vec4> random_directions(std::mt19937& random) {
     std::vector<glm::vec4> result;

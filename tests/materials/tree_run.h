@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cstddef>
 #include <glm/vec4.hpp>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -14,6 +17,19 @@
 /// Runs the shader of a tree on a device for many views and lights.
 
 namespace nacre::materials {
+
+/// Tests that run on each of `backends`; skipped where there is no such device, failed where it does not work.
+class TreeDeviceTest : public testing::TestWithParam<const char*> {
+  public:
+    static constexpr const char* backends[] = {"cpu:consistent", "vulkan", "gl"};
+    /// Without the mode.
+    static std::string name_of(const testing::TestParamInfo<const char*>& backend);
+
+  protected:
+    void SetUp() override;
+
+    std::unique_ptr<rhi::Device> device_;
+};
 
 inline constexpr std::uint32_t direction_pairs = 256;
 

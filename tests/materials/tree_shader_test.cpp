@@ -6,12 +6,9 @@
 
 #include <cmath>
 #include <cstring>
-#include <memory>
 #include <random>
 
 #include "materials/evaluation.h"
-#include "rhi/device.h"
-#include "samples/backends.h"
 #include "tests/materials/random_tree.h"
 #include "tests/materials/tree_run.h"
 
@@ -33,16 +30,8 @@ void main() {
     results[2u * i + 1u] = vec4(state.whole.view_transmittance, state.top.coverage);
 })";
 
-class TreeShaderTest : public testing::TestWithParam<const char*> {
+class TreeShaderTest : public TreeDeviceTest {
   protected:
-    void SetUp() override {
-        static const rhi::Instance instance(all_backends());
-        auto device = instance.create_device({.backend = GetParam()});
-        if (!device && device.error().code == ErrorCode::not_found) GTEST_SKIP() << device.error().message();
-        ASSERT_TRUE(device) << device.error().message();
-        device_ = std::move(*device);
-    }
-
     Expected<std::vector<glm::vec4>> run(const TreeShader& tree, const std::vector<glm::vec4>& inputs) {
         NACRE_TRY(const std::vector<std::byte> bytes,
                   run_tree(*device_, tree, tree.glsl + main_text, inputs, inputs.size() * sizeof(glm::vec4)));
@@ -77,8 +66,6 @@ class TreeShaderTest : public testing::TestWithParam<const char*> {
         EXPECT_LT(worst, 1e-3) << topology_text(flat.visible_tree) << " view " << inputs[2 * worst_at].z << " light "
                                << inputs[2 * worst_at + 1].z;
     }
-
-    std::unique_ptr<rhi::Device> device_;
 };
 
 TEST_P(TreeShaderTest, ShadesAsTheHostDoes) {
@@ -122,10 +109,7 @@ TEST_P(TreeShaderTest, TexturesMultiplyTheirInputs) {
     compare(*flatten(tree), *flatten(plain), random);
 }
 
-INSTANTIATE_TEST_SUITE_P(Backends, TreeShaderTest, testing::Values("cpu:consistent", "vulkan", "gl"),
-                         [](const auto& backend) {
-                             return std::string(backend.param).substr(0, std::string(backend.param).find(':'));
-                         });
+INSTANTIATE_TEST_SUITE_P(Backends, TreeShaderTest, testing::ValuesIn(TreeDeviceTest::backends), TreeDeviceTest::name_of);
 
 // Materials of one topology share a shader, whatever their numbers are.
 TEST(TreeShader, TextDependsOnTopologyAndFeaturesOnly) {
