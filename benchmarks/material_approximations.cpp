@@ -197,11 +197,11 @@ void lobes(Report& report) {
                     library.sheen_density(library.sheen_map(view, roughness), light);
          });
     lobe(report, "Charlie, Neubelt's visibility", sheen, -1.0, [&](Vector view, Vector light, double roughness) {
-        return library.charlie_distribution(library.half_vector(view, light).z, roughness) *
+        return library.charlie_distribution(library.half_vector(view, light), roughness) *
                library.neubelt_visibility(view.z, light.z) * light.z;
     });
     lobe(report, "Charlie, own visibility", sheen, -1.0, [&](Vector view, Vector light, double roughness) {
-        return library.charlie_distribution(library.half_vector(view, light).z, roughness) *
+        return library.charlie_distribution(library.half_vector(view, light), roughness) *
                library.charlie_visibility(view.z, light.z, roughness, false) * light.z;
     });
 }
