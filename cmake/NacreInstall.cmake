@@ -33,7 +33,7 @@ set(public_headers
   materials/closures/octahedral.glsl materials/closures/stored_fields.glsl materials/closures/stored_frame.glsl
   materials/closures/table_textures.glsl materials/storage_shader.h
   materials/closures/thin_film.glsl materials/builtin_materials.h materials/description_tree.h materials/evaluation.h
-  materials/layering_error.h materials/random_walk.h materials/reference_stacks.h
+  materials/custom_material.h materials/layering_error.h materials/material_blob.h materials/random_walk.h materials/reference_stacks.h
   materials/preview.h materials/simplification.h materials/storage.h materials/topology.h materials/tree.h
   materials/tree_json.h materials/tree_shader.h
   scene/builtin.h scene/environment.h scene/load.h scene/scene.h scene/shapes.h scene/tangents.h
