@@ -29,7 +29,7 @@
 ///
 /// and reads
 ///
-///     vec4 custom_numbers(uint i)      // CustomMaterialData::numbers, 0 to 5
+///     vec4 custom_numbers(uint i)      // CustomMaterialData::numbers, 0 to 4
 ///     vec4 custom_sideband(uint i)     // CustomMaterialData::sideband
 ///     vec4 material_texel(int i)       // texture i at this place, white where there is none; i is a constant
 ///     vec3 shading_normal()            // world, with texture 2 as normal map, turned to the viewer where double-sided
@@ -64,7 +64,7 @@ enum CustomReads : std::uint32_t {
 struct CustomMaterialData {
     static constexpr std::uint32_t max_sideband = 512;
 
-    std::array<glm::vec4, blob_rows - blob_payload_row> numbers{};  ///< Part of the blob.
+    std::array<glm::vec4, blob_normal_scale_row - blob_payload_row> numbers{};  ///< Part of the blob.
     std::vector<glm::vec4> sideband;  ///< What does not fit; at most max_sideband, as many in all materials of a kind.
     std::array<TextureReference, blob_textures> textures{};  ///< 2: normal map. 4: read only where `emits`.
     AlphaMode alpha_mode = AlphaMode::opaque;

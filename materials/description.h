@@ -27,6 +27,7 @@
 namespace nacre::materials {
 
 struct Tree;
+class CustomMaterial;
 
 /// Moves texture coordinates before the lookup (KHR_texture_transform):
 /// uv' = translate(offset) * rotate(rotation) * scale(scale) * uv, angles counter-clockwise as that extension draws it.
@@ -174,6 +175,8 @@ struct MaterialDescription {
     /// A tree of slabs (materials/tree.h) in place of all that shades above; emission, alpha, normals of plain slabs and
     /// the like stay for whoever does without trees. Null: none.
     std::shared_ptr<const Tree> tree;
+    /// A material of the program's own kind (materials/custom_material.h) in place of all above. Null: none.
+    std::shared_ptr<CustomMaterial> custom;
     std::vector<UnknownExtension> other_extensions;  ///< By name; "extras" last, under that name.
 };
 

@@ -11,6 +11,12 @@ constexpr std::uint32_t alpha_mode_shift = 16, double_sided_bit = 1u << 18, unli
 constexpr std::uint32_t textures_mask = (1u << blob_textures) - 1;
 constexpr std::uint32_t second_uv_shift = 7, transformed_bit = 1u << 14, number_shift = 16;
 
+void set_half(glm::uvec4& row, std::uint32_t index, std::uint32_t value) {
+    const std::uint32_t shift = (index & 1u) * 16u;
+    std::uint32_t& word = row[static_cast<glm::length_t>(index >> 1u)];
+    word = (word & ~(0xffffu << shift)) | (value & 0xffffu) << shift;
+}
+
 }  // namespace
 
 void MaterialBlob::set_header(const MaterialHeader& header) {
@@ -40,14 +46,18 @@ MaterialHeader MaterialBlob::header() const {
 }
 
 void MaterialBlob::set_texture(std::uint32_t index, std::uint32_t texture) {
-    const std::uint32_t shift = (index & 1u) * 16u;
-    std::uint32_t& word = rows[blob_texture_row + index / 8][static_cast<glm::length_t>((index >> 1u) & 3u)];
-    word = (word & ~(0xffffu << shift)) | (texture & 0xffffu) << shift;
+    set_half(rows[blob_texture_row], index, texture);
 }
 
 std::uint32_t MaterialBlob::texture(std::uint32_t index) const {
-    const std::uint32_t word = rows[blob_texture_row + index / 8][static_cast<glm::length_t>((index >> 1u) & 3u)];
+    const std::uint32_t word = rows[blob_texture_row][static_cast<glm::length_t>(index >> 1u)];
     return (word >> ((index & 1u) * 16u)) & 0xffffu;
+}
+
+glm::uvec4 texture_row(std::span<const std::uint32_t> textures) {
+    glm::uvec4 row(0);
+    for (std::uint32_t i = 0; i < textures.size(); ++i) set_half(row, i, textures[i]);
+    return row;
 }
 
 void MaterialBlob::set_numbers(std::uint32_t row, const glm::vec4& numbers) {
@@ -71,7 +81,8 @@ MaterialBlob plain_slab_blob(const SingleSlab& slab) {
     blob.set_numbers(blob_payload_row, glm::vec4(slab.base_color, slab.alpha));
     blob.set_numbers(blob_payload_row + 1, glm::vec4(slab.emission, slab.metallic));
     blob.set_numbers(blob_payload_row + 2, glm::vec4(slab.f0, slab.f90));
-    blob.set_numbers(blob_payload_row + 3, {slab.roughness, slab.occlusion_strength, slab.normal_scale, 0.0f});
+    blob.set_numbers(blob_payload_row + 3, {slab.roughness, slab.occlusion_strength, 0.0f, 0.0f});
+    blob.set_numbers(blob_normal_scale_row, {slab.normal_scale, 0.0f, 0.0f, 0.0f});
     return blob;
 }
 
@@ -88,7 +99,7 @@ SingleSlab plain_slab_of(const MaterialBlob& blob) {
     slab.f90 = f0.w;
     slab.emission = glm::vec3(emission);
     slab.occlusion_strength = scales.y;
-    slab.normal_scale = scales.z;
+    slab.normal_scale = blob.numbers(blob_normal_scale_row).x;
     slab.alpha_mode = header.alpha_mode;
     slab.alpha_cutoff = header.alpha_cutoff;
     slab.unlit = header.unlit;

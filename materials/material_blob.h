@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec4.hpp>
+#include <span>
 
 #include "materials/single_slab.h"
 
@@ -21,20 +22,24 @@
 /// passes/shared/material_blob.glsl reads the same rows. Rows are four words of 32 bits:
 ///
 ///     row 0      header
-///     rows 1-7   plain slabs and materials of a program's own: 7 textures, then 24 numbers;
-///                trees: as many textures as the topology has, then its numbers if they fit
+///     row 1      numbers of 7 textures, 16 bits each
+///     rows 2-6   numbers: of a plain slab, or of a material of a program's own
+///     row 7      scale of the normal map
+///
+/// A material that is a tree has the plain slab that stands for it (for alpha, emission, and whoever does without
+/// trees) in rows 1 to 5, and in row 6 where the numbers and textures of its topology lie in the sideband.
 ///
 /// Everything here is a value type without shared state.
 
 namespace nacre::materials {
 
 inline constexpr std::uint32_t blob_rows = 8;
-/// Textures of a material that is not a tree.
+/// Textures beside those of a tree.
 inline constexpr std::uint32_t blob_textures = 7;
-/// Numbers of textures take 16 bits, 8 to a row, from this row on.
 inline constexpr std::uint32_t blob_texture_row = 1;
-/// First row of numbers of a material that is not a tree.
-inline constexpr std::uint32_t blob_payload_row = 2;
+inline constexpr std::uint32_t blob_payload_row = 2;  ///< First row of numbers.
+inline constexpr std::uint32_t blob_tree_row = 6;     ///< x: first row of the tree's numbers; y: of its textures, 8 to a row.
+inline constexpr std::uint32_t blob_normal_scale_row = 7;  ///< x: for texture 2.
 
 /// Which GLSL shades a blob.
 enum class BlobType : std::uint16_t {
@@ -55,7 +60,7 @@ struct MaterialHeader {
     bool emits = false;
     float alpha_cutoff = 0.5f;
     std::uint32_t sideband = no_sideband;  ///< First row in the buffer that holds what did not fit.
-    std::uint8_t textures = 0;    ///< Bit i: texture i is there. Trees know theirs by topology.
+    std::uint8_t textures = 0;    ///< Bit i: texture i is there.
     std::uint8_t second_uv = 0;   ///< Bit i: texture i is read with the second texture coordinates.
     bool transformed = false;     ///< The sideband begins with two rows for each of 7 textures, which move coordinates.
 
@@ -70,27 +75,20 @@ struct MaterialBlob {
 
     void set_header(const MaterialHeader& header);
     [[nodiscard]] MaterialHeader header() const;
-    /// Number of a texture, 0 to 65535; `index` counts the material's textures and is below 56.
+    /// Number of a texture, 0 to 65535; `index` is below blob_textures.
     void set_texture(std::uint32_t index, std::uint32_t texture);
     [[nodiscard]] std::uint32_t texture(std::uint32_t index) const;
     /// Four floats, kept bit by bit.
     void set_numbers(std::uint32_t row, const glm::vec4& numbers);
     [[nodiscard]] glm::vec4 numbers(std::uint32_t row) const;
 };
+/// A row of the sideband that holds the numbers of up to 8 textures.
+[[nodiscard]] glm::uvec4 texture_row(std::span<const std::uint32_t> textures);
 static_assert(sizeof(MaterialBlob) == 128);
 
 /// The numbers of a plain slab and the header as far as the slab knows it; what textures there are is for whoever has them.
 [[nodiscard]] MaterialBlob plain_slab_blob(const SingleSlab& slab);
 /// The slab of such a blob again, without its textures.
 [[nodiscard]] SingleSlab plain_slab_of(const MaterialBlob& blob);
-
-/// Whether the numbers of a tree lie in its blob, behind its textures. Equal for all materials of a topology.
-[[nodiscard]] constexpr bool tree_fits_blob(std::size_t textures, std::size_t rows_of_numbers) {
-    return blob_texture_row + (textures + 7) / 8 + rows_of_numbers <= blob_rows;
-}
-/// The row of a tree's first number there.
-[[nodiscard]] constexpr std::uint32_t tree_numbers_row(std::size_t textures) {
-    return blob_texture_row + static_cast<std::uint32_t>((textures + 7) / 8);
-}
 
 }  // namespace nacre::materials

@@ -12,6 +12,19 @@ namespace nacre::passes {
 
 using rhi::ResourceUse;
 
+namespace {
+
+/// What drawing a draw in a pass reads.
+ShadingFeatures features_in(const GeometryPassDesc& desc, const Draw& draw) {
+    if (draw.has_closures && !desc.closure_shader.empty()) return draw.closure_features;
+    ShadingFeatures features = draw.features;
+    // Depth alone is the same for all kinds.
+    if (desc.fragment_shader.empty()) features.kind = features.kind_attributes = features.sideband = 0;
+    return restricted(features, desc.textures, desc.with_normals, desc.with_colors);
+}
+
+}  // namespace
+
 Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPassDesc& desc,
                                       std::vector<std::uint32_t> draws, bool keep_order) {
     shaders_ = &context.shaders;
@@ -70,8 +83,7 @@ Expected<void> GeometryDraws::prepare(RenderContext& context, const GeometryPass
     for (const std::uint32_t index : draws) {
         const Draw& draw = geometry_->draws()[index];
         const bool by_closures = draw.has_closures && !desc.closure_shader.empty();
-        ShadingFeatures features = by_closures ? draw.closure_features
-                                               : restricted(draw.features, desc.textures, desc.with_normals, desc.with_colors);
+        ShadingFeatures features = features_in(desc, draw);
         if (!desc.keeps_unlit) features.unlit = false;
         const bool culls = desc.culls && !draw.two_faces;
         Key key{features, culls ? rhi::CullMode::back : rhi::CullMode::none,
@@ -145,9 +157,7 @@ void uses_geometry(PassDeclaration& pass, const RenderContext& context, const Ge
     for (const std::uint32_t index : draws) {
         const Draw& draw = context.geometry.draws()[index];
         const bool by_closures = draw.has_closures && !desc.closure_shader.empty();
-        const std::uint32_t attributes =
-            by_closures ? draw.closure_features.attributes
-                        : restricted(draw.features, desc.textures, desc.with_normals, desc.with_colors).attributes;
+        const std::uint32_t attributes = features_in(desc, draw).attributes;
         for (std::uint32_t a = 0; a < attribute_count; ++a) {
             if ((attributes & (1u << a)) != 0) attribute_readers[a].push_back(index);
         }

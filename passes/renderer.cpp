@@ -9,9 +9,11 @@
 #include <cmath>
 #include <cstring>
 #include <glm/gtc/packing.hpp>
+#include <iterator>
 
 #include "core/srgb.h"
 #include "passes/camera_block.h"
+#include "passes/custom_kinds.h"
 #include "passes/environment_preparation/environment_preparation.h"
 #include "passes/exact_readback.h"
 #include "passes/lights.h"
@@ -26,11 +28,11 @@ using rhi::FormatSupport;
 namespace {
 
 /// Features of slabs that were made not to exist are taken off before anything looks at them.
-std::vector<materials::SingleSlab> make_slabs(const scene::Scene& scene, Feature without) {
+std::vector<materials::SingleSlab> make_slabs(const scene::Scene& scene, const CustomKinds& kinds, Feature without) {
     std::vector<materials::SingleSlab> slabs;
     slabs.reserve(scene.materials.size());
-    for (const materials::MaterialDescription& material : scene.materials) {
-        materials::SingleSlab slab = materials::single_slab(material);
+    for (std::uint32_t i = 0; i < scene.materials.size(); ++i) {
+        materials::SingleSlab slab = kinds.kind_of(i) != 0 ? kinds.slab_of(i) : materials::single_slab(scene.materials[i]);
         if (has(without, Feature::emission)) slab.emission = glm::vec3(0.0f), slab.emission_texture = {};
         if (has(without, Feature::alpha_test) && slab.alpha_mode == materials::AlphaMode::mask) {
             slab.alpha_mode = materials::AlphaMode::opaque;
@@ -118,6 +120,7 @@ struct Renderer::State {
     bool handles_made = false;
 
     std::unique_ptr<ShaderLibrary> shaders;
+    CustomKinds kinds;
     SceneClosures closures;
     std::unique_ptr<SceneGeometry> geometry;
     std::unique_ptr<SceneMaterials> materials;
@@ -177,13 +180,14 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
                            "Use another device.");
     }
 
-    const auto slabs = make_slabs(scene, options.without);
+    NACRE_TRY(kinds, CustomKinds::choose(scene));
+    const auto slabs = make_slabs(scene, kinds, options.without);
     const bool colors = !has(options.without, Feature::vertex_colors);
     if (!has(options.without, Feature::closures)) {
         NACRE_TRY(closures, SceneClosures::choose(scene, *profile, profile->storage_in_fragment && capabilities.storage_in_fragment,
                                                   warnings));
     }
-    NACRE_TRY(geometry, SceneGeometry::create(device, scene, slabs, closures, all_textures, colors));
+    NACRE_TRY(geometry, SceneGeometry::create(device, scene, slabs, closures, kinds, all_textures, colors));
     std::vector<bool> used(slabs.size());
     std::uint32_t textures = 0;
     std::uint32_t blended = 0;
@@ -208,7 +212,7 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
     const float anisotropy = capabilities.anisotropic_filtering
                                  ? std::min(static_cast<float>(profile->texture_anisotropy), capabilities.max_anisotropy)
                                  : 1.0f;
-    NACRE_TRY(materials, SceneMaterials::create(device, scene, slabs, closures, used, all_textures, anisotropy));
+    NACRE_TRY(materials, SceneMaterials::create(device, scene, slabs, closures, kinds, used, all_textures, anisotropy));
 
     // Float targets, where the profile wants them and the device has them.
     const bool wants_32 = profile->float32_lit_color;
@@ -276,7 +280,9 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
 /// What several passes read: camera, lights, tables, environment.
 Expected<void> Renderer::State::make_shared_objects(const scene::Scene& scene) {
     handles_made = true;
-    shaders = std::make_unique<ShaderLibrary>(device, options.cache, options.shader_folder, closures.files());
+    std::vector<EmbeddedFile> made = closures.files();
+    std::ranges::copy(kinds.files(), std::back_inserter(made));
+    shaders = std::make_unique<ShaderLibrary>(device, options.cache, options.shader_folder, std::move(made));
     const scene::Environment& sky = options.environment != nullptr ? *options.environment : scene.environment;
     NACRE_TRY(environment, PreparedEnvironment::create(device, *shaders, sky, profile->environment_size,
                                                        profile->environment_samples));
@@ -556,6 +562,7 @@ Expected<FrameStatistics> Renderer::render_frame() {
     const auto start = std::chrono::steady_clock::now();
     const CameraBlock camera = camera_block(state.view, state.options.width, state.options.height);
     NACRE_CHECK(state.device.write_buffer(state.camera, std::as_bytes(std::span(&camera, 1))));
+    NACRE_CHECK(state.materials->update());
     state.context->visible = state.geometry->visible_in(camera.view_projection);
     for (const std::unique_ptr<RenderPass>& pass : state.passes) pass->update(glm::vec3(camera.position));
     rhi::CommandList list = state.device.create_command_list("frame");

@@ -22,7 +22,7 @@ using materials::Topology;
 
 /// Whether the model of one plain slab (materials/single_slab.h) is not all that the material says.
 bool has_several_lobes(const MaterialDescription& material) {
-    if (material.unlit) return false;
+    if (material.unlit || material.custom) return false;
     if (material.tree) return true;
     return (material.clearcoat && material.clearcoat->factor > 0.0f) ||
            (material.sheen && material.sheen->color != glm::vec3(0.0f)) ||
@@ -53,10 +53,14 @@ bool lets_light_through(const FlattenedTree& flat) {
 /// The GLSL of one material's topology, and the numbers that it reads.
 class TextWriter {
   public:
-    TextWriter(const MaterialDescription& description, ClosureMaterial& material)
-        : description_(description), material_(material), topology_(material.flat.topology) {}
+    /// `known_features`: those that shaders with this text know, at least the topology's own.
+    TextWriter(const TextureReference& occlusion, ClosureMaterial& material, std::uint32_t known_features = 0)
+        : occlusion_(occlusion), material_(material), topology_(material.flat.topology) {
+        material.flat.topology.features |= known_features;
+    }
 
-    std::string run() {
+    /// What all stages share: from numbers, textures and a place on the surface to what is stored.
+    std::string topology() {
         materials::TreeShader tree = materials::tree_shader(material_.flat);
         numbers_ = tree.parameters;
         std::string functions;
@@ -70,39 +74,43 @@ class TextWriter {
         print_occlusion();
         std::swap(text_, functions);
 
-        text_ += tree.defines;
         while (numbers_.size() % 4 != 0) numbers_.push_back(0.0f);
-        print("layout(set = 1, binding = 0, std140) uniform ClosureBlock {{ vec4 closure_numbers[{}]; }};\n",
-              std::max<std::size_t>(numbers_.size() / 4, 1));
+        material_.numbers.resize(std::max<std::size_t>(numbers_.size() / 4, 1));
+        for (std::size_t i = 0; i < numbers_.size(); ++i) {
+            material_.numbers[i / 4][static_cast<glm::length_t>(i % 4)] = numbers_[i];
+        }
+        defines_ = std::move(tree.defines);
+        print("float tree_parameter(uint index) {{ return tree_row(index >> 2u)[index & 3u]; }}\n");
+        text_ += samples_ + functions;
+        text_ += tree.glsl;
+        print_closures();
+        if (material_.layout.storage_class == StorageClass::simple) {
+            print("#define PLAIN_SLAB\nconst uint stored_words = 2u;\n");
+        } else {
+            text_ += materials::storage_writer(material_.flat, material_.layout);
+        }
+        print("const bool stored_has_subsurface = {};\n", material_.layout.has_subsurface);
+        return std::move(text_);
+    }
+
+    /// What a draw's shader includes before: where it finds them. After topology().
+    std::string bindings() {
+        text_ = defines_;
+        if (material_.writes_slices()) print("#define WRITES_SLICES\n");
+        print("#define READS_POSITION\n#define TREE_NUMBERS {}\n#include \"passes/shared/draw_tree.glsl\"\n",
+              material_.numbers.size());
         print("layout(set = 1, binding = 1) uniform usampler2D interface_texels;\n");
         if (has(materials::slab_medium)) print("layout(set = 1, binding = 2) uniform usampler2D medium_texels;\n");
         if (has(materials::slab_anisotropy)) print("layout(set = 1, binding = 3) uniform usampler2D anisotropy_texels;\n");
         for (std::size_t i = 0; i < material_.textures.size(); ++i) {
-            print("layout(set = 1, binding = {}) uniform sampler2D closure_texture_{};\n", first_closure_texture + i, i);
+            print("layout(set = 1, binding = {}) uniform sampler2D closure_texture_{};\n", first_material_texture + i, i);
         }
-        print(
-            "#include \"passes/shared/fragment_inputs.glsl\"\n#include \"materials/closures/table_textures.glsl\"\n"
-            "layout(location = 5) in vec3 in_position;\n"
-            "float tree_parameter(uint index) {{ return closure_numbers[index >> 2u][index & 3u]; }}\n");
+        print("#include \"materials/closures/table_textures.glsl\"\n");
         if (has(materials::slab_specular_lut)) print("vec3 specular_lut(uint index, vec2 at) {{ return vec3(1.0); }}\n");
         if (has(materials::slab_glints)) {
             print(
                 "#ifdef HAS_UV0\n#define NACRE_TREE_GLINT_POSITION in_uv0\n#define NACRE_TREE_GLINT_DX dFdx(in_uv0)\n"
                 "#define NACRE_TREE_GLINT_DY dFdy(in_uv0)\n#endif\n");
-        }
-        text_ += samples_ + functions;
-        text_ += tree.glsl;
-        print_closures();
-        if (material_.layout.storage_class == StorageClass::simple) {
-            print("#define PLAIN_SLAB\n");
-        } else {
-            text_ += materials::storage_writer(material_.flat, material_.layout);
-            print("const bool stored_has_subsurface = {};\n", material_.layout.has_subsurface);
-            if (material_.writes_slices()) print("#define WRITES_SLICES\n");
-        }
-        material_.numbers.resize(std::max<std::size_t>(numbers_.size() / 4, 1));
-        for (std::size_t i = 0; i < numbers_.size(); ++i) {
-            material_.numbers[i / 4][static_cast<glm::length_t>(i % 4)] = numbers_[i];
         }
         return std::move(text_);
     }
@@ -127,19 +135,20 @@ class TextWriter {
         const auto known = std::ranges::find(material_.textures, reference);
         const auto index = static_cast<std::size_t>(known - material_.textures.begin());
         if (known == material_.textures.end()) material_.textures.push_back(reference);
-        std::string uv = fmt::format("in_uv{}", reference.uv_set);
-        if (!reference.transform.is_identity()) {
-            const materials::TextureTransform& t = reference.transform;
-            const float c = std::cos(t.rotation), s = std::sin(t.rotation);
-            const std::size_t row = numbers({c * t.scale.x, s * t.scale.y, t.offset.x, 0.0f});
-            numbers({-s * t.scale.x, c * t.scale.y, t.offset.y, 0.0f});
-            uv = fmt::format("vec2(dot(closure_numbers[{0}].xyz, vec3({2}, 1.0)), dot(closure_numbers[{1}].xyz, vec3({2}, 1.0)))",
-                             row, row + 1, uv);
+        std::string texel;
+        if (reference.transform.is_identity()) {
+            texel = fmt::format("closure_texel({}, {})", index, reference.uv_set);
+        } else {
+            glm::vec4 rows[2];
+            write_uv_rows(reference.transform, rows);
+            const std::size_t row = numbers(rows[0]);
+            numbers(rows[1]);
+            texel = fmt::format("closure_texel_moved({}, {}, tree_row({}u), tree_row({}u))", index, reference.uv_set, row, row + 1);
         }
         samples_ += fmt::format(
-            "vec4 closure_sample_{0}() {{\n#ifdef HAS_UV{1}\n    return texture(closure_texture_{2}, {3});\n#else\n    return "
-            "{4};\n#endif\n}}\n",
-            sample_count_, reference.uv_set, index, uv, without);
+            "vec4 closure_sample_{0}() {{\n#ifdef HAS_UV{1}\n    WHERE_UV{1} return {2};\n#endif\n"
+            "#if !defined(HAS_UV{1}) || defined(NACRE_HITS)\n    return {3};\n#endif\n}}\n",
+            sample_count_, reference.uv_set, texel, without);
         return fmt::format("closure_sample_{}()", sample_count_++);
     }
 
@@ -151,18 +160,18 @@ class TextWriter {
                 material_.needs_tangents = true;
                 const std::size_t scale = numbers(glm::vec4(frame.normal_texture.scale));
                 normals += fmt::format(
-                    "    if (frame == {}u) return ({}.rgb * 2.0 - 1.0) * vec3(closure_numbers[{}].xx, 1.0);\n", i,
+                    "    if (frame == {}u) return ({}.rgb * 2.0 - 1.0) * vec3(tree_row({}u).xx, 1.0);\n", i,
                     sample(frame.normal_texture, "vec4(0.5, 0.5, 1.0, 1.0)"), scale);
             }
             const std::size_t turn = numbers({std::cos(frame.rotation), std::sin(frame.rotation), 0.0f, 0.0f});
             if (frame.rotation_texture.present()) {
                 rotations += fmt::format(
                     "    if (frame == {0}u) {{\n        vec2 turn = {1}.rg * 2.0 - 1.0;\n        vec2 by = "
-                    "closure_numbers[{2}].xy;\n        return vec2(turn.x * by.x - turn.y * by.y, turn.x * by.y + turn.y * "
+                    "tree_row({2}u).xy;\n        return vec2(turn.x * by.x - turn.y * by.y, turn.x * by.y + turn.y * "
                     "by.x);\n    }}\n",
                     i, sample(frame.rotation_texture, "vec4(1.0, 0.5, 1.0, 1.0)"), turn);
             } else {
-                rotations += fmt::format("    if (frame == {}u) return closure_numbers[{}].xy;\n", i, turn);
+                rotations += fmt::format("    if (frame == {}u) return tree_row({}u).xy;\n", i, turn);
             }
         }
         if (has(materials::slab_anisotropy)) material_.needs_tangents = true;
@@ -171,13 +180,13 @@ class TextWriter {
     }
 
     void print_occlusion() {
-        const TextureReference& texture = description_.occlusion_texture;
+        const TextureReference& texture = occlusion_;
         if (!texture.present()) {
             print("float tree_occlusion() {{ return 1.0; }}\n");
             return;
         }
         const std::size_t strength = numbers(glm::vec4(std::clamp(texture.scale, 0.0f, 1.0f)));
-        print("float tree_occlusion() {{ return 1.0 + closure_numbers[{}].x * ({}.r - 1.0); }}\n", strength, sample(texture));
+        print("float tree_occlusion() {{ return 1.0 + tree_row({}u).x * ({}.r - 1.0); }}\n", strength, sample(texture));
     }
 
     void print_closures() {
@@ -194,15 +203,21 @@ class TextWriter {
         print("    return sum;\n}}\n");
     }
 
-    const MaterialDescription& description_;
+    const TextureReference& occlusion_;
     ClosureMaterial& material_;
     const Topology& topology_;
     std::vector<float> numbers_;
-    std::string text_, samples_;
+    std::string text_, samples_, defines_;
     std::uint32_t sample_count_ = 0;
 };
 
 }  // namespace
+
+void write_uv_rows(const materials::TextureTransform& transform, glm::vec4* rows) {
+    const float c = std::cos(transform.rotation), s = std::sin(transform.rotation);
+    rows[0] = {c * transform.scale.x, s * transform.scale.y, transform.offset.x, 0.0f};
+    rows[1] = {-s * transform.scale.x, c * transform.scale.y, transform.offset.y, 0.0f};
+}
 
 Expected<SceneClosures> SceneClosures::choose(const scene::Scene& scene, const Profile& profile, bool storage_in_fragment,
                                               std::vector<std::string>& warnings) {
@@ -239,15 +254,19 @@ Expected<SceneClosures> SceneClosures::choose(const scene::Scene& scene, const P
             materials::storage_layout(material.flat, {.has_occlusion = description.occlusion_texture.present()});
         material.is_translucent =
             description.alpha_mode == materials::AlphaMode::opaque && lets_light_through(material.flat);
-        std::string text = TextWriter(description, material).run();
-        const auto [known, is_new] = topologies.emplace(std::move(text), static_cast<std::uint32_t>(topologies.size()));
+        TextWriter writer(description.occlusion_texture, material);
+        std::string text = writer.topology();
+        const std::string bindings = writer.bindings();
+        const auto [known, is_new] = topologies.emplace(bindings + text, static_cast<std::uint32_t>(topologies.size()));
         material.topology = known->second;
         if (is_new) {
             auto files = std::make_unique<Text>();
-            files->topology = known->first;
+            files->topology = std::move(text);
             files->topology_path = fmt::format("passes/closures/topology_{}.glsl", material.topology);
+            files->first_material = i;
+            files->occlusion = description.occlusion_texture;
             const auto wrap = [&](const char* main) {
-                return fmt::format("#version 460\n#include \"{}\"\n#include \"{}\"\n", files->topology_path, main);
+                return fmt::format("#version 460\n{}#include \"{}\"\n#include \"{}\"\n", bindings, files->topology_path, main);
             };
             files->base_pass = wrap("passes/base_pass/base_pass.closures.glsl");
             files->base_pass_path = fmt::format("passes/closures/base_pass_{}.frag", material.topology);

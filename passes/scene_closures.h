@@ -10,6 +10,7 @@
 
 #include "core/embedded_file.h"
 #include "core/error.h"
+#include "materials/material_blob.h"
 #include "materials/storage_shader.h"
 #include "materials/tree_shader.h"
 #include "passes/profiles.h"
@@ -30,8 +31,8 @@ struct ClosureMaterial {
     materials::FlattenedTree flat;
     materials::StorageLayout layout;
     std::uint32_t topology = 0;             ///< Number of its text; materials of one topology share shaders.
-    std::vector<glm::vec4> numbers;         ///< Content of ClosureBlock.
-    std::vector<materials::TextureReference> textures;  ///< Binding first_closure_texture and on of set 1.
+    std::vector<glm::vec4> numbers;         ///< What its text reads as tree_row().
+    std::vector<materials::TextureReference> textures;  ///< Binding first_material_texture and on of set 1.
     std::uint32_t features = 0;             ///< Of all slabs that the base pass evaluates.
     bool is_translucent = false;            ///< What lies behind shows through.
     bool needs_tangents = false;
@@ -40,14 +41,17 @@ struct ClosureMaterial {
     [[nodiscard]] bool writes_slices() const { return layout.material_words() > 2 || layout.has_subsurface; }
 };
 
-/// Bindings of set 1 of these materials: the block, three tables, then textures.
+/// Bindings of set 1: the blob, three tables for closures, the sideband (of trees: their numbers), then textures.
 inline constexpr std::uint32_t closure_table_count = 3;  ///< Interface, medium, anisotropy.
 /// Whether closures with these features read a table.
 [[nodiscard]] constexpr bool reads_table(std::uint32_t features, std::uint32_t table) {
     constexpr std::uint32_t needed_by[closure_table_count] = {0, materials::slab_medium, materials::slab_anisotropy};
     return table == 0 || (features & needed_by[table]) != 0;
 }
-inline constexpr std::uint32_t first_closure_texture = 1 + closure_table_count;
+inline constexpr std::uint32_t sideband_binding = 1 + closure_table_count;
+inline constexpr std::uint32_t first_material_texture = sideband_binding + 1;
+/// translate * rotate * scale of KHR_texture_transform, as two rows.
+void write_uv_rows(const materials::TextureTransform& transform, glm::vec4* rows);
 
 class SceneClosures {
   public:
@@ -90,6 +94,8 @@ class SceneClosures {
         std::string topology, topology_path;
         std::string base_pass, base_pass_path;
         std::string blend, blend_path;
+        std::uint32_t first_material = 0;        ///< One that has it.
+        materials::TextureReference occlusion;   ///< Of that one.
     };
     std::vector<std::optional<ClosureMaterial>> materials_;
     std::vector<std::unique_ptr<Text>> texts_;

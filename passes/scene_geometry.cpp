@@ -89,7 +89,7 @@ void append_rows(std::vector<std::byte>& to, const glm::mat4& world) {
 
 Expected<std::unique_ptr<SceneGeometry>> SceneGeometry::create(rhi::Device& device, const scene::Scene& scene,
                                                                const std::vector<materials::SingleSlab>& slabs,
-                                                               const SceneClosures& closures,
+                                                               const SceneClosures& closures, const CustomKinds& kinds,
                                                                std::uint32_t allowed_textures, bool with_colors) {
     auto result = std::unique_ptr<SceneGeometry>(new SceneGeometry(device));
     std::array<std::vector<std::byte>, attribute_count> attributes;
@@ -112,7 +112,7 @@ Expected<std::unique_ptr<SceneGeometry>> SceneGeometry::create(rhi::Device& devi
                 const materials::SingleSlab& slab = slabs[primitive.material];
                 Draw& draw = shared.draw;
                 draw.material = primitive.material;
-                draw.features = restricted(features_of(slab, primitive), allowed_textures, true, with_colors);
+                draw.features = restricted(features_of(slab, primitive, kinds.kind_of(primitive.material), kinds.data_of(primitive.material)), allowed_textures, true, with_colors);
                 draw.topology = primitive.topology;
                 draw.two_faces = slab.double_sided || primitive.topology != scene::Topology::triangle_list;
                 draw.alpha_mode = slab.alpha_mode;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "passes/custom_kinds.h"
 #include "passes/scene_closures.h"
 #include "passes/shading_features.h"
 #include "rhi/device.h"
@@ -15,7 +16,7 @@
 /// The geometry of a scene on a device: one buffer for each vertex attribute that something needs, one for indices and one
 /// for the places of instances; and the list of what is to be drawn.
 ///
-///     NACRE_TRY(auto geometry, SceneGeometry::create(device, scene, slabs, closures, all_textures, true));
+///     NACRE_TRY(auto geometry, SceneGeometry::create(device, scene, slabs, closures, kinds, all_textures, true));
 ///     for (const Draw& draw : geometry->draws()) geometry->record(list, draw, attributes);
 
 namespace nacre::passes {
@@ -43,7 +44,7 @@ class SceneGeometry {
     /// Uploads what the draws of the scene need. `slabs` has one entry for each material.
     static Expected<std::unique_ptr<SceneGeometry>> create(rhi::Device& device, const scene::Scene& scene,
                                                            const std::vector<materials::SingleSlab>& slabs,
-                                                           const SceneClosures& closures,
+                                                           const SceneClosures& closures, const CustomKinds& kinds,
                                                            std::uint32_t allowed_textures, bool with_colors);
     ~SceneGeometry();
     SceneGeometry(const SceneGeometry&) = delete;

@@ -15,19 +15,6 @@
 namespace nacre::passes {
 namespace {
 
-/// As MaterialBlock in passes/shared/material.glsl.
-struct MaterialBlock {
-    glm::vec4 base_color, emission, f0, scales;
-    std::array<glm::vec4, 2 * texture_slot_count> uv_rows;
-};
-
-/// translate * rotate * scale of KHR_texture_transform, as two rows.
-void write_rows(const materials::TextureTransform& transform, glm::vec4* rows) {
-    const float c = std::cos(transform.rotation), s = std::sin(transform.rotation);
-    rows[0] = {c * transform.scale.x, s * transform.scale.y, transform.offset.x, 0.0f};
-    rows[1] = {-s * transform.scale.x, c * transform.scale.y, transform.offset.y, 0.0f};
-}
-
 rhi::AddressMode address_mode(scene::Wrap wrap) {
     switch (wrap) {
         case scene::Wrap::repeat: return rhi::AddressMode::repeat;
@@ -126,34 +113,77 @@ Expected<void> SceneMaterials::upload_tables(std::uint32_t tables) {
     return {};
 }
 
+Expected<SceneMaterials::BoundTexture> SceneMaterials::texture_for(const scene::Scene& scene,
+                                                                   const materials::TextureReference& reference,
+                                                                   float anisotropy) {
+    const bool has_mips = reference.sampler < 0 || scene.samplers[static_cast<std::size_t>(reference.sampler)].mip !=
+                                                       scene::MipFilter::none;
+    BoundTexture result;
+    NACRE_TRY(result.texture, upload_image(scene, reference.image, has_mips));
+    NACRE_TRY(result.sampler, sampler_of(scene, reference.sampler, anisotropy));
+    const auto same = [&](const BoundTexture& other) {
+        return other.texture == result.texture && other.sampler == result.sampler;
+    };
+    const auto known = std::ranges::find_if(table_, same);
+    result.number = static_cast<std::uint32_t>(known - table_.begin());
+    if (known == table_.end()) table_.push_back(result);
+    return result;
+}
+
+std::uint32_t SceneMaterials::place_of(rhi::Texture texture) const {
+    return static_cast<std::uint32_t>(std::ranges::find(all_textures_, texture) - all_textures_.begin());
+}
+
+std::uint32_t SceneMaterials::add_rows(std::span<const glm::uvec4> rows) {
+    // Draws bind some of these rows as a block of their own.
+    while (rows_.size() % row_alignment_ != 0) rows_.emplace_back(0);
+    const auto first = static_cast<std::uint32_t>(rows_.size());
+    rows_.insert(rows_.end(), rows.begin(), rows.end());
+    return first;
+}
+
 Expected<void> SceneMaterials::add_closures(const scene::Scene& scene, std::uint32_t material,
-                                            const ClosureMaterial& closures, std::uint64_t block_offset,
-                                            float anisotropy) {
+                                            const ClosureMaterial& closures, float anisotropy) {
+    Closures& result = closures_[material];
+    std::vector<std::uint32_t> numbers;
+    for (const materials::TextureReference& reference : closures.textures) {
+        NACRE_TRY(const BoundTexture texture, texture_for(scene, reference, anisotropy));
+        result.bound.push_back(texture);
+        numbers.push_back(texture.number);
+    }
+    result.first_row = add_rows({reinterpret_cast<const glm::uvec4*>(closures.numbers.data()), closures.numbers.size()});
+    result.row_count = static_cast<std::uint32_t>(closures.numbers.size());
+    std::vector<glm::uvec4> texture_rows;
+    for (std::size_t i = 0; i < numbers.size(); i += 8) {
+        texture_rows.push_back(materials::texture_row(std::span(numbers).subspan(i, std::min<std::size_t>(8, numbers.size() - i))));
+    }
+    blobs_[material].rows[materials::blob_tree_row] = {result.first_row, add_rows(texture_rows), 0, 0};
+    materials::MaterialHeader header = blobs_[material].header();
+    header.type = static_cast<std::uint16_t>(static_cast<std::uint32_t>(materials::BlobType::first_tree) + closures.topology);
+    blobs_[material].set_header(header);
+    return {};
+}
+
+Expected<void> SceneMaterials::bind_closures(std::uint32_t material, const ClosureMaterial& closures) {
     Closures& result = closures_[material];
     std::vector<rhi::BindingLayout> bindings = {
-        {.binding = 0, .type = rhi::BindingType::uniform_buffer, .stages = rhi::ShaderStage::fragment}};
-    std::vector<rhi::BindGroupEntry> entries = {{.binding = 0,
+        {.binding = sideband_binding, .type = rhi::BindingType::uniform_buffer, .stages = rhi::ShaderStage::fragment}};
+    std::vector<rhi::BindGroupEntry> entries = {{.binding = sideband_binding,
                                                  .buffer = block_,
-                                                 .offset = block_offset,
-                                                 .size = closures.numbers.size() * sizeof(glm::vec4)}};
+                                                 .offset = result.first_row * sizeof(glm::uvec4),
+                                                 .size = result.row_count * sizeof(glm::uvec4)}};
     const auto add = [&](std::uint32_t binding, rhi::Texture texture, rhi::Sampler sampler) {
         bindings.push_back({.binding = binding,
                             .type = rhi::BindingType::combined_texture_sampler,
                             .stages = rhi::ShaderStage::fragment});
         entries.push_back({.binding = binding, .texture = texture, .sampler = sampler});
-        const auto place = std::ranges::find(all_textures_, texture) - all_textures_.begin();
-        result.textures.push_back(static_cast<std::uint32_t>(place));
+        result.textures.push_back(place_of(texture));
     };
     for (std::uint32_t i = 0; i < closure_table_count; ++i) {
         if (reads_table(closures.features, i)) add(1 + i, tables_[i], table_sampler_);
     }
-    for (std::uint32_t i = 0; i < closures.textures.size(); ++i) {
-        const materials::TextureReference& reference = closures.textures[i];
-        const bool has_mips = reference.sampler < 0 || scene.samplers[static_cast<std::size_t>(reference.sampler)].mip !=
-                                                           scene::MipFilter::none;
-        NACRE_TRY(const rhi::Texture texture, upload_image(scene, reference.image, has_mips));
-        NACRE_TRY(const rhi::Sampler sampler, sampler_of(scene, reference.sampler, anisotropy));
-        add(first_closure_texture + i, texture, sampler);
+    for (std::uint32_t i = 0; i < result.bound.size(); ++i) {
+        add(first_material_texture + i, result.bound[i].texture, result.bound[i].sampler);
     }
     NACRE_TRY(result.layout, device_.create_bind_group_layout({.bindings = bindings, .name = "closures"}));
     NACRE_TRY(result.group, device_.create_bind_group({.layout = result.layout,
@@ -162,9 +192,83 @@ Expected<void> SceneMaterials::add_closures(const scene::Scene& scene, std::uint
     return {};
 }
 
+Expected<void> SceneMaterials::add_slab(const scene::Scene& scene, std::uint32_t material, const materials::SingleSlab& slab,
+                                        const materials::CustomMaterialData* custom, std::uint32_t allowed_textures,
+                                        float anisotropy) {
+    materials::MaterialBlob& blob = blobs_[material];
+    if (custom != nullptr) {
+        for (std::uint32_t i = 0; i < custom->numbers.size(); ++i) {
+            blob.set_numbers(materials::blob_payload_row + i, custom->numbers[i]);
+        }
+    }
+    materials::MaterialHeader header = blob.header();
+    std::vector<glm::vec4> sideband;
+    if (moves_textures(slab)) {
+        header.transformed = true;
+        sideband.resize(2 * texture_slot_count);
+        for (std::uint32_t slot = 0; slot < texture_slot_count; ++slot) {
+            write_uv_rows(texture_of(slab, static_cast<TextureSlot>(slot)).transform, &sideband[2 * slot]);
+        }
+    }
+    Slab& result = slabs_[material];
+    for (std::uint32_t slot = 0; slot < texture_slot_count; ++slot) {
+        const materials::TextureReference& reference = texture_of(slab, static_cast<TextureSlot>(slot));
+        if (!reference.present() || (allowed_textures & (1u << slot)) == 0) continue;
+        NACRE_TRY(const BoundTexture texture, texture_for(scene, reference, anisotropy));
+        result.bound.emplace_back(slot, texture);
+        blob.set_texture(slot, texture.number);
+        header.textures = static_cast<std::uint8_t>(header.textures | 1u << slot);
+        if (reference.uv_set == 1) header.second_uv = static_cast<std::uint8_t>(header.second_uv | 1u << slot);
+    }
+    if (custom != nullptr) {
+        result.custom_row = static_cast<std::uint32_t>(sideband.size());
+        sideband.insert(sideband.end(), custom->sideband.begin(), custom->sideband.end());
+    }
+    if (!sideband.empty()) {
+        header.sideband = add_rows({reinterpret_cast<const glm::uvec4*>(sideband.data()), sideband.size()});
+        result.row_count = static_cast<std::uint32_t>(sideband.size());
+        result.custom_row += header.sideband;
+    }
+    blob.set_header(header);
+    return {};
+}
+
+Expected<void> SceneMaterials::bind_slab(std::uint32_t material) {
+    Slab& slab = slabs_[material];
+    std::vector<rhi::BindingLayout> bindings = {
+        {.binding = 0, .type = rhi::BindingType::uniform_buffer, .stages = rhi::ShaderStage::fragment}};
+    std::vector<rhi::BindGroupEntry> entries = {{.binding = 0,
+                                                 .buffer = block_,
+                                                 .offset = std::uint64_t{material} * blob_stride_ * sizeof(glm::uvec4),
+                                                 .size = sizeof(materials::MaterialBlob)}};
+    if (slab.row_count > 0) {
+        bindings.push_back(
+            {.binding = sideband_binding, .type = rhi::BindingType::uniform_buffer, .stages = rhi::ShaderStage::fragment});
+        entries.push_back({.binding = sideband_binding,
+                           .buffer = block_,
+                           .offset = blobs_[material].header().sideband * sizeof(glm::uvec4),
+                           .size = slab.row_count * sizeof(glm::uvec4)});
+        texture_masks_[material] |= 1u << texture_slot_count;
+    }
+    for (const auto& [slot, texture] : slab.bound) {
+        bindings.push_back({.binding = first_material_texture + slot,
+                            .type = rhi::BindingType::combined_texture_sampler,
+                            .stages = rhi::ShaderStage::fragment});
+        entries.push_back(
+            {.binding = first_material_texture + slot, .texture = texture.texture, .sampler = texture.sampler});
+        texture_masks_[material] |= 1u << slot;
+        textures_of_[material].push_back(place_of(texture.texture));
+    }
+    NACRE_TRY(layouts_[material], device_.create_bind_group_layout({.bindings = bindings, .name = "material"}));
+    NACRE_TRY(groups_[material], device_.create_bind_group({.layout = layouts_[material],
+                                                            .entries = entries,
+                                                            .name = fmt::format("material {}", material)}));
+    return {};
+}
+
 Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& device, const scene::Scene& scene,
                                                                  const std::vector<materials::SingleSlab>& slabs,
-                                                                 const SceneClosures& closures,
+                                                                 const SceneClosures& closures, const CustomKinds& kinds,
                                                                  const std::vector<bool>& used,
                                                                  std::uint32_t allowed_textures, float anisotropy) {
     auto result = std::unique_ptr<SceneMaterials>(new SceneMaterials(device));
@@ -173,68 +277,46 @@ Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& de
     result->texture_masks_.resize(slabs.size());
     result->textures_of_.resize(slabs.size());
     result->closures_.resize(slabs.size());
+    result->slabs_.resize(slabs.size());
+    result->blobs_.resize(slabs.size());
     if (slabs.empty()) return result;
-
-    const std::uint64_t alignment = std::max(device.capabilities().uniform_offset_alignment, 16u);
-    const std::uint64_t stride = (sizeof(MaterialBlock) + alignment - 1) / alignment * alignment;
-    std::vector<std::byte> blocks(stride * slabs.size());
-    for (std::size_t i = 0; i < slabs.size(); ++i) {
-        const materials::SingleSlab& slab = slabs[i];
-        MaterialBlock block{};
-        block.base_color = glm::vec4(slab.base_color, slab.alpha);
-        block.emission = glm::vec4(slab.emission, slab.metallic);
-        block.f0 = glm::vec4(slab.f0, slab.f90);
-        block.scales = {slab.roughness, slab.occlusion_strength, slab.normal_scale, slab.alpha_cutoff};
-        for (std::uint32_t slot = 0; slot < texture_slot_count; ++slot) {
-            write_rows(texture_of(slab, static_cast<TextureSlot>(slot)).transform, &block.uv_rows[2 * slot]);
-        }
-        std::memcpy(blocks.data() + stride * i, &block, sizeof(block));
+    if (slabs.size() > max_materials) {
+        return fail(ErrorCode::unsupported, "upload materials", fmt::format("'{}'", scene.name),
+                    fmt::format("{} materials are more than {}", slabs.size(), max_materials), "Use fewer materials.");
     }
-    std::vector<std::uint64_t> closure_offsets(slabs.size());
-    for (std::uint32_t i = 0; i < slabs.size(); ++i) {
-        const ClosureMaterial* material = closures.find(i);
-        if (material == nullptr) continue;
-        closure_offsets[i] = blocks.size();
-        const std::uint64_t size = material->numbers.size() * sizeof(glm::vec4);
-        blocks.resize(blocks.size() + (size + alignment - 1) / alignment * alignment);
-        std::memcpy(blocks.data() + closure_offsets[i], material->numbers.data(), size);
-    }
-    NACRE_TRY(result->block_, device.create_buffer({.size = blocks.size(),
-                                                    .usage = rhi::BufferUsage::uniform | rhi::BufferUsage::copy_destination,
-                                                    .name = "materials"}));
-    NACRE_CHECK(device.write_buffer(result->block_, std::span<const std::byte>(blocks)));
 
+    constexpr std::uint32_t row_bytes = sizeof(glm::uvec4);
+    result->row_alignment_ = std::max(device.capabilities().uniform_offset_alignment / row_bytes, 1u);
+    result->blob_stride_ = std::max(materials::blob_rows, result->row_alignment_);
+    result->rows_.resize(result->blob_stride_ * slabs.size());
     NACRE_CHECK(result->upload_tables(closures.tables()));
     for (std::uint32_t i = 0; i < slabs.size(); ++i) {
+        materials::MaterialBlob& blob = result->blobs_[i];
+        blob = materials::plain_slab_blob(slabs[i]);
+        materials::MaterialHeader header = blob.header();
+        header.number = static_cast<std::uint16_t>(i);
+        if (const std::uint32_t kind = kinds.kind_of(i); kind != 0) {
+            header.type = static_cast<std::uint16_t>(static_cast<std::uint32_t>(materials::BlobType::first_custom) + kind);
+            result->customs_.push_back({i, kinds.material(i)});
+        }
+        blob.set_header(header);
+        if (used[i]) {
+            NACRE_CHECK(result->add_slab(scene, i, slabs[i], kinds.data_of(i), allowed_textures, anisotropy));
+            if (const ClosureMaterial* material = closures.find(i)) {
+                NACRE_CHECK(result->add_closures(scene, i, *material, anisotropy));
+            }
+        }
+        std::ranges::copy(blob.rows, result->rows_.begin() + static_cast<std::ptrdiff_t>(i * result->blob_stride_));
+    }
+    auto usage = rhi::BufferUsage::uniform | rhi::BufferUsage::copy_destination;
+    if (device.capabilities().max_storage_buffers[2] > 0) usage |= rhi::BufferUsage::storage;
+    NACRE_TRY(result->block_,
+              device.create_buffer({.size = result->rows_.size() * row_bytes, .usage = usage, .name = "materials"}));
+    NACRE_CHECK(device.write_buffer(result->block_, std::as_bytes(std::span(result->rows_))));
+    for (std::uint32_t i = 0; i < slabs.size(); ++i) {
         if (!used[i]) continue;
-        if (const ClosureMaterial* material = closures.find(i)) {
-            NACRE_CHECK(result->add_closures(scene, i, *material, closure_offsets[i], anisotropy));
-        }
-        std::vector<rhi::BindingLayout> bindings = {
-            {.binding = 0, .type = rhi::BindingType::uniform_buffer, .stages = rhi::ShaderStage::fragment}};
-        std::vector<rhi::BindGroupEntry> entries = {
-            {.binding = 0, .buffer = result->block_, .offset = stride * i, .size = sizeof(MaterialBlock)}};
-        for (std::uint32_t slot = 0; slot < texture_slot_count; ++slot) {
-            const materials::TextureReference& reference = texture_of(slabs[i], static_cast<TextureSlot>(slot));
-            if (!reference.present() || (allowed_textures & (1u << slot)) == 0) continue;
-            const scene::Sampler sampler = reference.sampler >= 0
-                                               ? scene.samplers[static_cast<std::size_t>(reference.sampler)]
-                                               : scene::Sampler{};
-            NACRE_TRY(const rhi::Texture texture,
-                      result->upload_image(scene, reference.image, sampler.mip != scene::MipFilter::none));
-            bindings.push_back({.binding = slot + 1,
-                                .type = rhi::BindingType::combined_texture_sampler,
-                                .stages = rhi::ShaderStage::fragment});
-            NACRE_TRY(const rhi::Sampler texture_sampler, result->sampler_of(scene, reference.sampler, anisotropy));
-            entries.push_back({.binding = slot + 1, .texture = texture, .sampler = texture_sampler});
-            result->texture_masks_[i] |= 1u << slot;
-            result->textures_of_[i].push_back(
-                static_cast<std::uint32_t>(std::ranges::find(result->all_textures_, texture) - result->all_textures_.begin()));
-        }
-        NACRE_TRY(result->layouts_[i], device.create_bind_group_layout({.bindings = bindings, .name = "material"}));
-        NACRE_TRY(result->groups_[i], device.create_bind_group({.layout = result->layouts_[i],
-                                                                .entries = entries,
-                                                                .name = fmt::format("material {}", i)}));
+        if (const ClosureMaterial* material = closures.find(i)) NACRE_CHECK(result->bind_closures(i, *material));
+        NACRE_CHECK(result->bind_slab(i));
     }
     if (!result->without_mips_yet_.empty()) {
         rhi::CommandList list = device.create_command_list("mips of material textures");
@@ -242,6 +324,32 @@ Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& de
         NACRE_CHECK(device.submit(std::move(list)));
     }
     return result;
+}
+
+Expected<std::uint32_t> SceneMaterials::update() {
+    std::uint32_t changed = 0;
+    for (const auto& [index, custom] : customs_) {
+        if (custom->update() == materials::MaterialUpdate::none) continue;
+        ++changed;
+        const materials::CustomMaterialData data = custom->data();
+        materials::MaterialBlob& blob = blobs_[index];
+        for (std::uint32_t i = 0; i < data.numbers.size(); ++i) {
+            blob.set_numbers(materials::blob_payload_row + i, data.numbers[i]);
+        }
+        NACRE_CHECK(device_.write_buffer(block_, std::as_bytes(std::span(blob.rows)),
+                                         std::uint64_t{index} * blob_stride_ * sizeof(glm::uvec4)));
+        const Slab& slab = slabs_[index];
+        const std::uint32_t moving = blob.header().transformed ? 2 * texture_slot_count : 0;
+        if (data.sideband.size() + moving != slab.row_count) {
+            return fail(ErrorCode::invalid_argument, "update material", fmt::format("{}", index),
+                        fmt::format("its sideband had {} rows and has {}", slab.row_count - moving, data.sideband.size()),
+                        "Keep the size of a sideband.");
+        }
+        if (data.sideband.empty()) continue;
+        NACRE_CHECK(device_.write_buffer(block_, std::as_bytes(std::span(data.sideband)),
+                                         std::uint64_t{slab.custom_row} * sizeof(glm::uvec4)));
+    }
+    return changed;
 }
 
 SceneMaterials::~SceneMaterials() {

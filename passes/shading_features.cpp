@@ -2,6 +2,7 @@
 #include "passes/shading_features.h"
 
 #include <array>
+#include <string>
 
 namespace nacre::passes {
 namespace {
@@ -30,7 +31,9 @@ void derive_attributes(ShadingFeatures& features) {
     if ((features.textures & ~features.second_uv) != 0) features.attributes |= attribute_bit(Attribute::uv0);
     if (features.second_uv != 0) features.attributes |= attribute_bit(Attribute::uv1);
     if ((features.textures & texture_bit(TextureSlot::normal)) != 0) features.attributes |= attribute_bit(Attribute::tangent);
-    if (features.textures == 0) features.transforms = false;
+    features.attributes |= features.kind_attributes;
+    // A kind's own rows lie behind those that move textures.
+    if (features.textures == 0 && features.sideband == 0) features.transforms = false;
 }
 
 }  // namespace
@@ -48,7 +51,16 @@ const materials::TextureReference& texture_of(const materials::SingleSlab& slab,
     return slab.specular_color_texture;
 }
 
-ShadingFeatures features_of(const materials::SingleSlab& slab, const scene::Primitive& primitive) {
+bool moves_textures(const materials::SingleSlab& slab) {
+    for (std::uint32_t i = 0; i < texture_slot_count; ++i) {
+        const materials::TextureReference& texture = texture_of(slab, static_cast<TextureSlot>(i));
+        if (texture.present() && !texture.transform.is_identity()) return true;
+    }
+    return false;
+}
+
+ShadingFeatures features_of(const materials::SingleSlab& slab, const scene::Primitive& primitive, std::uint32_t kind,
+                            const materials::CustomMaterialData* custom) {
     ShadingFeatures features;
     features.attributes = attribute_bit(Attribute::position);
     features.unlit = slab.unlit || primitive.normals.empty();
@@ -72,13 +84,27 @@ ShadingFeatures features_of(const materials::SingleSlab& slab, const scene::Prim
         if (texture.uv_set == 1) features.second_uv |= texture_bit(slot);
         if (!texture.transform.is_identity()) features.transforms = true;
     }
+    if (kind != 0) {
+        features.kind = kind;
+        features.sideband = static_cast<std::uint32_t>(custom->sideband.size());
+        if (features.sideband > 0) features.transforms = moves_textures(slab);
+        const auto reads = [&](std::uint32_t bit, bool has, Attribute attribute) {
+            if ((custom->reads & bit) != 0 && has) features.kind_attributes |= attribute_bit(attribute);
+        };
+        reads(materials::reads_uv0, !primitive.uv0.empty(), Attribute::uv0);
+        reads(materials::reads_uv1, !primitive.uv1.empty(), Attribute::uv1);
+        reads(materials::reads_tangents, !primitive.tangents.empty(), Attribute::tangent);
+        if ((custom->reads & materials::reads_colors) == 0) features.attributes &= ~attribute_bit(Attribute::color);
+    }
     derive_attributes(features);
     return features;
 }
 
 ShadingFeatures restricted(ShadingFeatures features, std::uint32_t textures, bool with_normals, bool with_colors) {
+    const bool is_emission_read = (textures & texture_bit(TextureSlot::emission)) != 0;
+    if (features.kind != 0) textures = all_textures, with_normals = with_colors = true;
     features.textures &= textures;
-    if ((textures & texture_bit(TextureSlot::emission)) == 0) features.emits = false;
+    if (!is_emission_read) features.emits = false;
     if (!with_normals) {
         features.attributes &= ~attribute_bit(Attribute::normal);
         features.double_sided = false;
@@ -94,6 +120,7 @@ std::vector<rhi::ShaderDefine> vertex_defines(const ShadingFeatures& features) {
     add_attribute_defines(defines, features.attributes);
     if (features.points) defines.push_back({"POINTS"});
     if (features.thin) defines.push_back({"THIN"});
+    if (features.kind != 0) defines.push_back({"HAS_POSITIONS"});
     return defines;
 }
 
@@ -105,6 +132,9 @@ std::vector<rhi::ShaderDefine> fragment_defines(const ShadingFeatures& features)
         defines.push_back({slot_defines[i], (features.second_uv & (1u << i)) != 0 ? "1" : "0"});
     }
     if (features.transforms) defines.push_back({"TEXTURE_TRANSFORMS"});
+    const std::uint32_t sideband = features.sideband + (features.transforms ? 2 * texture_slot_count : 0);
+    if (sideband > 0) defines.push_back({"MATERIAL_SIDEBAND", std::to_string(sideband)});
+    if (features.kind != 0) defines.push_back({"MATERIAL_KIND", std::to_string(features.kind)});
     if (features.double_sided) defines.push_back({"DOUBLE_SIDED"});
     if (features.unlit) defines.push_back({"UNLIT"});
     if (features.emits) defines.push_back({"HAS_EMISSION"});

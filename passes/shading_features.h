@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "materials/custom_material.h"
 #include "materials/single_slab.h"
 #include "rhi/shader_compiler.h"
 #include "scene/scene.h"
@@ -18,7 +19,7 @@
 
 namespace nacre::passes {
 
-/// Textures of a slab, in the order of their bindings (slot i is binding i + 1 of set 1).
+/// Textures of a slab, in the order of their bindings (passes/scene_closures.h) and of those in its blob.
 enum class TextureSlot : std::uint32_t {
     base_color, metallic_roughness, normal, occlusion, emission, specular, specular_color,
 };
@@ -42,6 +43,9 @@ struct ShadingFeatures {
     bool emits = false;
     bool points = false;
     bool thin = false;             ///< Points or lines.
+    std::uint32_t kind = 0;             ///< Of a material of the program's own (passes/custom_kinds.h); 0: none.
+    std::uint32_t kind_attributes = 0;  ///< Those that the kind reads for itself.
+    std::uint32_t sideband = 0;         ///< Rows of the kind's own.
 
     friend auto operator<=>(const ShadingFeatures&, const ShadingFeatures&) = default;
 };
@@ -49,11 +53,15 @@ struct ShadingFeatures {
 /// The texture of a slot.
 [[nodiscard]] const materials::TextureReference& texture_of(const materials::SingleSlab& slab, TextureSlot slot);
 
-/// What drawing this primitive with this slab needs. A texture whose coordinates (or tangents) the primitive lacks is not
+/// What drawing this primitive with this slab needs, where it is of a kind of the program's own with `kind`. A texture whose coordinates (or tangents) the primitive lacks is not
 /// read; points and lines without normals are unlit, as glTF asks.
-[[nodiscard]] ShadingFeatures features_of(const materials::SingleSlab& slab, const scene::Primitive& primitive);
+[[nodiscard]] ShadingFeatures features_of(const materials::SingleSlab& slab, const scene::Primitive& primitive,
+                                          std::uint32_t kind = 0, const materials::CustomMaterialData* custom = nullptr);
+/// Whether some texture of a slab is moved.
+[[nodiscard]] bool moves_textures(const materials::SingleSlab& slab);
 
-/// The features that remain when a pass reads only some of the textures, and normals and colors only if it says so.
+/// The features that remain when a pass reads only some of the textures, and normals and colors only if it says so. Kinds of
+/// the program's own keep all of them: nobody knows which their functions read.
 [[nodiscard]] ShadingFeatures restricted(ShadingFeatures features, std::uint32_t textures, bool with_normals,
                                          bool with_colors);
 

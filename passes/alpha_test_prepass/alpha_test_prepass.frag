@@ -4,5 +4,5 @@
 #include "passes/shared/material.glsl"
 
 void main() {
-    if (base_color().a < material.scales.w) discard;
+    if (base_color().a < material_alpha_cutoff()) discard;
 }

@@ -2,6 +2,7 @@
 // Blended materials with several lobes: behind the text of a topology (passes/scene_closures.h). What they let through is
 // what is left of the picture behind them: for each channel with DUAL_SOURCE, else in the mean of the channels.
 layout(early_fragment_tests) in;
+#include "passes/shared/camera.glsl"
 #include "passes/shared/closure_inputs.glsl"
 #include "passes/shared/closure_lighting.glsl"
 #ifdef PACKED
@@ -17,11 +18,11 @@ layout(location = 0) out vec4 out_color;
 
 void main() {
     SurfaceFrames frames = surface_frames();
-    TreeState state = shade_surface(frames);
     LitPoint point;
     point.position = in_position;
     point.to_viewer = direction_to_viewer(in_position);
     point.footprint = pixel_footprint(in_position);
+    TreeState state = shade_surface(frames, point.to_viewer, point.footprint);
     point.occlusion = tree_occlusion();
 #ifdef LIGHTS
     LightVisibility visibility = light_visibility(in_position, frames.normals[0]);

@@ -3,10 +3,12 @@
 // Surfaces of alpha mode BLEND, lit as the deferred ones are; premultiplied with their coverage. UNLIT: the base color is
 // shown as it is. PACKED: into integer targets, which passes/blend/composite.comp lays over the picture.
 layout(early_fragment_tests) in;
+#ifndef UNLIT
+#define READS_POSITION
+#endif
 #include "passes/shared/material.glsl"
 #ifndef UNLIT
 #include "passes/shared/lighting.glsl"
-layout(location = 5) in vec3 in_position;
 #endif
 #ifdef PACKED
 #include "passes/shared/shared_exponent.glsl"

@@ -48,14 +48,17 @@ TEST(MaterialBlob, TexturesAndNumbersShareNoBit) {
     std::mt19937 random(8);
     MaterialBlob blob;
     blob.set_header({.type = 3, .number = 9});
-    std::uint32_t textures[56];
-    for (std::uint32_t i = 0; i < 56; ++i) blob.set_texture(i, textures[i] = random() & 0xffffu);
-    for (std::uint32_t i = 0; i < 56; ++i) EXPECT_EQ(blob.texture(i), textures[i]) << i;
+    std::uint32_t textures[blob_textures];
+    for (std::uint32_t i = 0; i < blob_textures; ++i) blob.set_texture(i, textures[i] = random() & 0xffffu);
+    for (std::uint32_t i = 0; i < blob_textures; ++i) EXPECT_EQ(blob.texture(i), textures[i]) << i;
     EXPECT_EQ(blob.header(), (MaterialHeader{.type = 3, .number = 9}));
-    blob.set_texture(13, 65535);
-    EXPECT_EQ(blob.texture(12), textures[12]);
-    EXPECT_EQ(blob.texture(13), 65535u);
-    EXPECT_EQ(blob.texture(14), textures[14]);
+    EXPECT_EQ(texture_row(textures), blob.rows[blob_texture_row]);
+    EXPECT_EQ(texture_row(std::span(textures, 0)), glm::uvec4(0));
+    blob.set_texture(3, 65535);
+    EXPECT_EQ(blob.texture(2), textures[2]);
+    EXPECT_EQ(blob.texture(3), 65535u);
+    EXPECT_EQ(blob.texture(4), textures[4]);
+    EXPECT_EQ(blob.rows[blob_payload_row], glm::uvec4(0));
 
     // Bits of numbers stay as they are: denormals, signed zeros, infinities.
     const glm::vec4 numbers(std::bit_cast<float>(1u), -0.0f, std::numeric_limits<float>::infinity(), 0.1f);
@@ -94,16 +97,6 @@ TEST(MaterialBlob, PlainSlabsComeBack) {
         EXPECT_EQ(back.double_sided, slab.double_sided);
         EXPECT_EQ(plain_slab_blob(back), blob);
     }
-}
-
-TEST(MaterialBlob, TreesKeepTheirNumbersWhereTheyFit) {
-    EXPECT_TRUE(tree_fits_blob(0, 7));
-    EXPECT_FALSE(tree_fits_blob(0, 8));
-    EXPECT_TRUE(tree_fits_blob(8, 6));
-    EXPECT_FALSE(tree_fits_blob(9, 6));
-    EXPECT_EQ(tree_numbers_row(0), 1u);
-    EXPECT_EQ(tree_numbers_row(8), 2u);
-    EXPECT_EQ(tree_numbers_row(9), 3u);
 }
 
 }  // namespace
