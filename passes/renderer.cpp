@@ -16,6 +16,8 @@
 #include "passes/custom_kinds.h"
 #include "passes/environment_preparation/environment_preparation.h"
 #include "passes/exact_readback.h"
+#include "passes/hit_materials.h"
+#include "passes/hit_shading/hit_shading.h"
 #include "passes/lights.h"
 #include "passes/profiles.h"
 #include "passes/render_pass.h"
@@ -124,6 +126,7 @@ struct Renderer::State {
     SceneClosures closures;
     std::unique_ptr<SceneGeometry> geometry;
     std::unique_ptr<SceneMaterials> materials;
+    std::unique_ptr<HitMaterials> hits;
     std::unique_ptr<PreparedEnvironment> environment;
 
     rhi::Buffer camera{}, lights{}, shadow_cameras{}, exposure{}, tile_lists_start{};
@@ -140,6 +143,7 @@ struct Renderer::State {
     FrameResources resources;
     std::unique_ptr<RenderContext> context;
     std::vector<std::unique_ptr<RenderPass>> passes;
+    std::unique_ptr<HitShading> hit_shading;
 
     Plan plan;
     std::vector<LeftOut> left_out;
@@ -212,7 +216,8 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
     const float anisotropy = capabilities.anisotropic_filtering
                                  ? std::min(static_cast<float>(profile->texture_anisotropy), capabilities.max_anisotropy)
                                  : 1.0f;
-    NACRE_TRY(materials, SceneMaterials::create(device, scene, slabs, closures, kinds, used, all_textures, anisotropy));
+    NACRE_TRY(materials, SceneMaterials::create(device, scene, slabs, closures, kinds, used, all_textures, anisotropy,
+                                                closures.tables() | (options.shade_hits ? 1u : 0u)));
 
     // Float targets, where the profile wants them and the device has them.
     const bool wants_32 = profile->float32_lit_color;
@@ -282,6 +287,10 @@ Expected<void> Renderer::State::make_shared_objects(const scene::Scene& scene) {
     handles_made = true;
     std::vector<EmbeddedFile> made = closures.files();
     std::ranges::copy(kinds.files(), std::back_inserter(made));
+    if (options.shade_hits) {
+        NACRE_TRY(hits, HitMaterials::create(device, *materials, closures, kinds));
+        made.push_back(hits->file());
+    }
     shaders = std::make_unique<ShaderLibrary>(device, options.cache, options.shader_folder, std::move(made));
     const scene::Environment& sky = options.environment != nullptr ? *options.environment : scene.environment;
     NACRE_TRY(environment, PreparedEnvironment::create(device, *shaders, sky, profile->environment_size,
@@ -449,6 +458,7 @@ Expected<void> Renderer::State::make_passes() {
         if (node.imported) continue;
         if (options.keep_intermediates || std::ranges::count(options.keep, node.desc.name) > 0) graph.do_not_share({i});
     }
+    if (options.shade_hits) graph.do_not_share(resources.depth);
     NACRE_CHECK(graph.compile());
     NACRE_CHECK(graph.realize(device));
 
@@ -465,6 +475,9 @@ Expected<void> Renderer::State::make_passes() {
     context->lighting_group = lighting_group;
 
     for (const std::unique_ptr<RenderPass>& pass : passes) NACRE_CHECK(pass->prepare(*context));
+    if (options.shade_hits) {
+        NACRE_TRY(hit_shading, HitShading::create(*context, *hits, camera));
+    }
 
     if (device.capabilities().timestamps) {
         const auto live = static_cast<std::uint32_t>(
@@ -567,6 +580,7 @@ Expected<FrameStatistics> Renderer::render_frame() {
     for (const std::unique_ptr<RenderPass>& pass : state.passes) pass->update(glm::vec3(camera.position));
     rhi::CommandList list = state.device.create_command_list("frame");
     state.graph.record(list, state.timestamps);
+    if (state.hit_shading) NACRE_CHECK(state.hit_shading->record(list));
     NACRE_CHECK(list.status());
     NACRE_TRY(const rhi::Fence fence, state.device.submit(std::move(list)));
     NACRE_CHECK(state.device.wait(fence));
@@ -685,6 +699,31 @@ Expected<IntermediateContent> Renderer::read_intermediate(std::string_view name,
     content.width = std::max(content.description.width >> mip, 1u);
     content.height = std::max(content.description.height >> mip, 1u);
     NACRE_TRY(content.bytes, state_->device.read_texture(texture, mip, layer));
+    return content;
+}
+
+Expected<IntermediateContent> Renderer::read_hits(std::string_view name, std::uint32_t layer) {
+    const rhi::Texture texture = state_->hit_shading ? state_->hit_shading->texture(name) : rhi::Texture{};
+    if (!state_->hit_shading || !state_->has_frame) {
+        return fail(ErrorCode::invalid_argument, "read shaded hits", fmt::format("'{}'", name),
+                    state_->hit_shading ? "no frame has been rendered" : "hits are not shaded",
+                    "Set RenderOptions::shade_hits and render a frame.");
+    }
+    if (!texture) {
+        return fail(ErrorCode::not_found, "read shaded hits", fmt::format("'{}'", name), "there is nothing of that name",
+                    "There are material.0, material.1, top_layer, albedo, emission, and material.slices where closures need it.");
+    }
+    NACRE_TRY(const rhi::TextureDesc desc, state_->device.describe(texture));
+    if (layer >= desc.layers) {
+        return fail(ErrorCode::invalid_argument, "read shaded hits", fmt::format("'{}'", name),
+                    fmt::format("it has {} layers", desc.layers), "Count from 0.");
+    }
+    IntermediateContent content;
+    content.description = {.name = std::string(name), .format = desc.format, .width = desc.width, .height = desc.height,
+                           .layers = desc.layers, .written_by = "hit shading", .fields = fields_of(name), .is_readable = true};
+    content.width = desc.width;
+    content.height = desc.height;
+    NACRE_TRY(content.bytes, state_->device.read_texture(texture, 0, layer));
     return content;
 }
 

@@ -69,6 +69,9 @@ struct RenderOptions {
     bool keep_intermediates = false;          ///< Every intermediate can be read after a frame; none share memory.
     std::vector<std::string> keep;            ///< As above for these names only.
     Feature without = Feature::none;
+    /// After each frame, shade what the camera sees once more in a compute shader, from the blobs of the materials as hits of
+    /// rays are shaded, for `read_hits` (docs/materials.md). Costs time and memory; the picture is the same.
+    bool shade_hits = false;
     DiskCache* cache = nullptr;               ///< For compiled shaders; null: nothing is kept.
     /// Root of a source tree whose shaders are used in place of those in the program, and followed by `reload_shaders`;
     /// empty: that of NACRE_SHADER_DIR, if any.
@@ -139,6 +142,12 @@ class Renderer {
     /// Content after the last frame. Errors: not_found (lists the names), invalid_argument (not kept).
     Expected<IntermediateContent> read_intermediate(std::string_view name, std::uint32_t layer = 0,
                                                     std::uint32_t mip = 0);
+
+    /// With RenderOptions::shade_hits, what was stored or found for each pixel: "material.0", "material.1", "top_layer" and
+    /// "material.slices" as the base pass stores them; "albedo" (rgb: towards the viewer; a: roughness) and "emission" (rgb:
+    /// cd/m2; a: 1 where the alpha test lets the surface be) as floats. Where nothing is seen all is 0. Errors: not_found,
+    /// invalid_argument.
+    Expected<IntermediateContent> read_hits(std::string_view name, std::uint32_t layer = 0);
 
     /// Four doubles for each texel of an intermediate texture of floats or fixed-point numbers, with all the precision
     /// that the device has (see exact_readback.h). Errors: those of `read_intermediate`, and unsupported.

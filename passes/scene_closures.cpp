@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <cctype>
 #include <map>
+#include <set>
 
 #include "materials/description_tree.h"
 #include "materials/simplification.h"
@@ -211,6 +213,28 @@ class TextWriter {
     std::uint32_t sample_count_ = 0;
 };
 
+/// Names that every topology's text and what is included behind it define: in one shader they need to differ.
+std::set<std::string> names_of_topology(const std::string& text) {
+    std::set<std::string> names = {"TreeState", "shade_tree", "pack_tree", "stored_words", "stored_top_closure",
+                                   "stored_top_frame", "stored_has_subsurface", "SurfaceFrames", "surface_frames",
+                                   "stored_frame", "shade_surface", "closure_words", "closure_properties"};
+    const auto is_part = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
+    for (std::size_t i = 0; i < text.size();) {
+        if (!is_part(text[i])) {
+            ++i;
+            continue;
+        }
+        const std::size_t start = i;
+        while (i < text.size() && is_part(text[i])) ++i;
+        std::string name = text.substr(start, i - start);
+        // tree_row() is there for all of them.
+        if ((name.starts_with("tree_") || name.starts_with("closure_sample_")) && name != "tree_row") {
+            names.insert(std::move(name));
+        }
+    }
+    return names;
+}
+
 }  // namespace
 
 void write_uv_rows(const materials::TextureTransform& transform, glm::vec4* rows) {
@@ -272,6 +296,7 @@ Expected<SceneClosures> SceneClosures::choose(const scene::Scene& scene, const P
             files->base_pass_path = fmt::format("passes/closures/base_pass_{}.frag", material.topology);
             files->blend = wrap("passes/blend/blend.closures.glsl");
             files->blend_path = fmt::format("passes/closures/blend_{}.frag", material.topology);
+            files->points_path = fmt::format("passes/closures/surface_points_{}.frag", material.topology);
             result.texts_.push_back(std::move(files));
         }
         for (std::uint32_t table = 0; table < closure_table_count; ++table) {
@@ -318,8 +343,86 @@ std::vector<EmbeddedFile> SceneClosures::files() const {
         result.push_back({text->topology_path, text->topology});
         result.push_back({text->base_pass_path, text->base_pass});
         result.push_back({text->blend_path, text->blend});
+        // The same for all: it writes down places.
+        result.push_back({text->points_path, "#version 460\n#include \"passes/hit_shading/surface_points.glsl\"\n"});
     }
     return result;
+}
+
+std::string SceneClosures::hit_text() const {
+    std::uint32_t features = 0;
+    std::size_t words = 2;
+    for (const auto& material : materials_) {
+        if (!material) continue;
+        features |= material->features;
+        if (material->layout.storage_class != StorageClass::simple) {
+            words = std::max<std::size_t>(words, material->layout.material_words());
+        }
+    }
+    std::string text;
+    for (const materials::SlabFeature& feature : materials::slab_features()) {
+        if ((features & feature.bit) != 0) text += fmt::format("#define {} 1\n", feature.macro);
+    }
+    constexpr const char* tables[closure_table_count] = {"interface", "medium", "anisotropy"};
+    for (std::uint32_t i = 0; i < closure_table_count; ++i) {
+        if (reads_table(features, i)) {
+            text += fmt::format("layout(set = 2, binding = {}) uniform usampler2D {}_texels;\n", 1 + i, tables[i]);
+        }
+    }
+    text += "#include \"materials/closures/table_textures.glsl\"\n";
+    if ((features & materials::slab_specular_lut) != 0) {
+        text += "vec3 specular_lut(uint index, vec2 at) { return vec3(1.0); }\n";
+    }
+    if ((features & materials::slab_glints) != 0) {
+        text +=
+            "#define NACRE_TREE_GLINT_POSITION in_uv0\n#if TEXTURE_DETAIL == 0\n#define NACRE_TREE_GLINT_DX in_uv0_dx\n"
+            "#define NACRE_TREE_GLINT_DY in_uv0_dy\n#elif TEXTURE_DETAIL == 1\n"
+            "#define NACRE_TREE_GLINT_DX vec2(in_uv0_cone, 0.0)\n#define NACRE_TREE_GLINT_DY vec2(0.0, in_uv0_cone)\n#else\n"
+            "#define NACRE_TREE_GLINT_DX vec2(0.0)\n#define NACRE_TREE_GLINT_DY vec2(0.0)\n#endif\n";
+    }
+    // Before names are changed below.
+    text +=
+        "#include \"materials/closures/blending.glsl\"\n#include \"materials/closures/stored_fields.glsl\"\n"
+        "#include \"materials/closures/stored_frame.glsl\"\n#include \"passes/shared/gbuffer_fields.glsl\"\n";
+    text += fmt::format("const uint hit_word_capacity = {}u;\n", words);
+    for (std::size_t t = 0; t < texts_.size(); ++t) {
+        // A material of the topology, with the fields of slabs that others have.
+        ClosureMaterial material = *materials_[texts_[t]->first_material];
+        material.textures.clear();
+        const std::string topology = TextWriter(texts_[t]->occlusion, material, features).topology();
+        const std::set<std::string> names = names_of_topology(topology);
+        for (const std::string& name : names) text += fmt::format("#define {0} {0}_t{1}\n", name, t);
+        text += topology;
+        text +=
+            "#undef NACRE_CLOSURE_INPUTS\n#undef NACRE_CLOSURE_WORDS\n#undef NACRE_CLOSURE_PROPERTIES\n"
+            "#include \"passes/shared/closure_words.glsl\"\n#include \"passes/shared/closure_properties.glsl\"\n"
+            "#undef PLAIN_SLAB\n";
+        text += fmt::format(
+            "void own_hit_words_t{}(vec3 to_viewer, float footprint, uvec2 pixel, out uint words[hit_word_capacity], out uint "
+            "top_layer, out uint subsurface, out bool has_subsurface) {{\n    uint own[stored_words];\n    "
+            "closure_words(to_viewer, footprint, pixel, own, top_layer, subsurface);\n    for (uint i = 0u; i < "
+            "hit_word_capacity; ++i) words[i] = i < stored_words ? own[min(i, stored_words - 1u)] : 0u;\n    "
+            "has_subsurface = stored_has_subsurface;\n}}\n",
+            t);
+        for (const std::string& name : names) text += fmt::format("#undef {}\n", name);
+    }
+    text +=
+        "void tree_hit_words(uint topology, vec3 to_viewer, float footprint, uvec2 pixel, out uint words[hit_word_capacity], out "
+        "uint top_layer, out uint subsurface, out bool has_subsurface) {\n    for (uint i = 0u; i < hit_word_capacity; ++i) "
+        "words[i] = 0u;\n    top_layer = subsurface = 0u;\n    has_subsurface = false;\n";
+    for (std::size_t t = 0; t < texts_.size(); ++t) {
+        text += fmt::format(
+            "    if (topology == {0}u) own_hit_words_t{0}(to_viewer, footprint, pixel, words, top_layer, subsurface, "
+            "has_subsurface);\n",
+            t);
+    }
+    text +=
+        "}\nvoid tree_hit_properties(uint topology, vec3 to_viewer, float footprint, out vec3 albedo, out float roughness) {\n"
+        "    albedo = vec3(0.0);\n    roughness = 1.0;\n";
+    for (std::size_t t = 0; t < texts_.size(); ++t) {
+        text += fmt::format("    if (topology == {0}u) closure_properties_t{0}(to_viewer, footprint, albedo, roughness);\n", t);
+    }
+    return text + "}\n";
 }
 
 std::vector<rhi::ShaderDefine> SceneClosures::lighting_defines() const {

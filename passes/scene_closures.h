@@ -86,6 +86,9 @@ class SceneClosures {
     /// GLSL files of all topologies: "passes/closures/base_pass_N.frag" and "passes/closures/blend_N.frag". They live
     /// as long as this object.
     [[nodiscard]] std::vector<EmbeddedFile> files() const;
+    /// GLSL for hits of rays (passes/shared/hit_shading.glsl): the closures' library with the features of all materials, the
+    /// text of every topology, and functions that choose among them.
+    [[nodiscard]] std::string hit_text() const;
     /// Defines for a shader that reads stored closures.
     [[nodiscard]] std::vector<rhi::ShaderDefine> lighting_defines() const;
 
@@ -94,6 +97,7 @@ class SceneClosures {
         std::string topology, topology_path;
         std::string base_pass, base_pass_path;
         std::string blend, blend_path;
+        std::string points_path;
         std::uint32_t first_material = 0;        ///< One that has it.
         materials::TextureReference occlusion;   ///< Of that one.
     };

@@ -45,10 +45,11 @@ Expected<rhi::Texture> SceneMaterials::upload_image(const scene::Scene& scene, i
         .width = image.width,
         .height = image.height,
         .mips = with_mips ? rhi::full_mip_count(image.width, image.height) : 1,
-        .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::copy_destination,
+        // Tables of textures may copy them.
+        .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::copy_destination | rhi::TextureUsage::copy_source,
         .name = image.name.empty() ? fmt::format("image {}", index) : image.name};
     // generate_mips reads one mip and writes the next.
-    if (with_mips) desc.usage |= rhi::TextureUsage::copy_source | rhi::TextureUsage::color_target;
+    if (with_mips) desc.usage |= rhi::TextureUsage::color_target;
     NACRE_TRY(const rhi::Texture texture, device_.create_texture(desc));
     all_textures_.push_back(texture);
     textures_.emplace(key, texture);
@@ -167,8 +168,13 @@ Expected<void> SceneMaterials::add_closures(const scene::Scene& scene, std::uint
 Expected<void> SceneMaterials::bind_closures(std::uint32_t material, const ClosureMaterial& closures) {
     Closures& result = closures_[material];
     std::vector<rhi::BindingLayout> bindings = {
+        {.binding = 0, .type = rhi::BindingType::uniform_buffer, .stages = rhi::ShaderStage::fragment},
         {.binding = sideband_binding, .type = rhi::BindingType::uniform_buffer, .stages = rhi::ShaderStage::fragment}};
-    std::vector<rhi::BindGroupEntry> entries = {{.binding = sideband_binding,
+    std::vector<rhi::BindGroupEntry> entries = {{.binding = 0,
+                                                 .buffer = block_,
+                                                 .offset = std::uint64_t{material} * blob_stride_ * sizeof(glm::uvec4),
+                                                 .size = sizeof(materials::MaterialBlob)},
+                                                {.binding = sideband_binding,
                                                  .buffer = block_,
                                                  .offset = result.first_row * sizeof(glm::uvec4),
                                                  .size = result.row_count * sizeof(glm::uvec4)}};
@@ -270,7 +276,8 @@ Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& de
                                                                  const std::vector<materials::SingleSlab>& slabs,
                                                                  const SceneClosures& closures, const CustomKinds& kinds,
                                                                  const std::vector<bool>& used,
-                                                                 std::uint32_t allowed_textures, float anisotropy) {
+                                                                 std::uint32_t allowed_textures, float anisotropy,
+                                                                 std::uint32_t tables) {
     auto result = std::unique_ptr<SceneMaterials>(new SceneMaterials(device));
     result->groups_.resize(slabs.size());
     result->layouts_.resize(slabs.size());
@@ -289,7 +296,7 @@ Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& de
     result->row_alignment_ = std::max(device.capabilities().uniform_offset_alignment / row_bytes, 1u);
     result->blob_stride_ = std::max(materials::blob_rows, result->row_alignment_);
     result->rows_.resize(result->blob_stride_ * slabs.size());
-    NACRE_CHECK(result->upload_tables(closures.tables()));
+    NACRE_CHECK(result->upload_tables(tables));
     for (std::uint32_t i = 0; i < slabs.size(); ++i) {
         materials::MaterialBlob& blob = result->blobs_[i];
         blob = materials::plain_slab_blob(slabs[i]);

@@ -29,12 +29,14 @@ namespace nacre::passes {
 
 class SceneMaterials {
   public:
-    /// Uploads the slabs' numbers and those textures that are in `allowed_textures` (texture_bit).
+    /// Uploads the materials' numbers, those textures that are in `allowed_textures` (texture_bit), and those tables of
+    /// closures that are in `tables` (SceneClosures::tables() and what else is wanted).
     static Expected<std::unique_ptr<SceneMaterials>> create(rhi::Device& device, const scene::Scene& scene,
                                                             const std::vector<materials::SingleSlab>& slabs,
                                                             const SceneClosures& closures, const CustomKinds& kinds,
                                                             const std::vector<bool>& used,
-                                                            std::uint32_t allowed_textures, float anisotropy);
+                                                            std::uint32_t allowed_textures, float anisotropy,
+                                                            std::uint32_t tables);
     ~SceneMaterials();
     SceneMaterials(const SceneMaterials&) = delete;
     SceneMaterials& operator=(const SceneMaterials&) = delete;
@@ -72,6 +74,7 @@ class SceneMaterials {
     /// By number.
     [[nodiscard]] const std::vector<BoundTexture>& table() const { return table_; }
     [[nodiscard]] rhi::Sampler table_sampler() const { return table_sampler_; }
+    [[nodiscard]] std::uint32_t material_count() const { return static_cast<std::uint32_t>(blobs_.size()); }
     /// All textures, and which of them (by position) a material reads; for the statements of passes.
     [[nodiscard]] const std::vector<rhi::Texture>& textures() const { return all_textures_; }
     [[nodiscard]] const std::vector<std::uint32_t>& textures_of(std::uint32_t material) const {

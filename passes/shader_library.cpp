@@ -11,6 +11,7 @@
 #include "materials/storage_shader.h"
 #include "passes/gbuffer_layout.h"
 #include "passes/renderer.h"
+#include "rhi/embedded_shaders.h"
 
 namespace nacre::passes {
 namespace {
@@ -35,7 +36,7 @@ ShaderLibrary::ShaderLibrary(rhi::Device& device, DiskCache* cache, std::filesys
     : device_(device),
       made_(std::move(made)),
       compiler_(
-          {.embedded = {embedded_files(), generated_files(), materials::embedded_files(), materials::storage_reader_files(), made_},
+          {.embedded = {embedded_files(), generated_files(), materials::embedded_files(), materials::storage_reader_files(), rhi::embedded_files(), made_},
            .source_folder = std::move(folder), .cache = cache}),
       pipelines_(device, compiler_) {}
 

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef NACRE_CLOSURE_PROPERTIES
+#define NACRE_CLOSURE_PROPERTIES
+// What can be asked of a surface whose material is a tree without lighting it. Behind the text of a topology.
+#include "passes/shared/closure_inputs.glsl"
+
+void closure_properties(vec3 to_viewer, float footprint, out vec3 albedo, out float roughness) {
+    SurfaceFrames frames = surface_frames();
+    TreeState state = shade_surface(frames, to_viewer, footprint);
+    albedo = vec3(0.0);
+    for (uint i = 0u; i < tree_closure_count; ++i) {
+        Path path = state.paths[i];
+        vec3 weight = path.weight * state.coverages[i];
+        if (largest(weight) <= 0.0) continue;
+        vec3 view = view_in_frame(stored_frame(frames, tree_closure_frame(i)), to_viewer);
+        Closure closure = prepare_closure(state.slabs[i], view, footprint);
+        ClosureAlbedo own = closure_albedo(cover_closure(closure, path.spread, path.under_interface));
+        albedo += weight * (own.specular * top_transmittance(path, view.z) +
+                            (own.fuzz + own.diffuse) * top_transmittance(path, mean_cosine));
+    }
+    roughness = state.slabs[0].roughness;
+}
+
+#endif
