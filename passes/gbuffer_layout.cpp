@@ -83,7 +83,7 @@ bool field_differs(const Field& field, std::uint32_t a, std::uint32_t b) {
 std::string gbuffer_glsl() {
     std::string text =
         "// Generated from passes/gbuffer_layout.cpp. pack_NAME gives a field's bits in their place, to be or-ed.\n"
-        "#include \"materials/closures/octahedral.glsl\"\n";
+        "#ifndef NACRE_GBUFFER_FIELDS\n#define NACRE_GBUFFER_FIELDS\n#include \"materials/closures/octahedral.glsl\"\n";
     for (const Field& field : all_fields) {
         const std::uint32_t mask = field.bits == 32 ? ~0u : (1u << field.bits) - 1u;
         const std::string shifted = fmt::format("(word >> {}u) & 0x{:x}u", field.shift, mask);
@@ -110,7 +110,7 @@ std::string gbuffer_glsl() {
                 break;
         }
     }
-    return text;
+    return text + "#endif\n";
 }
 
 }  // namespace nacre::passes

@@ -11,8 +11,8 @@ layout(set = 0, binding = 2) uniform sampler2D depth;
 layout(set = 0, binding = 3, r32ui) uniform writeonly uimage2D material_0;
 layout(set = 0, binding = 4, r32ui) uniform writeonly uimage2D material_1;
 layout(set = 0, binding = 5, r32ui) uniform writeonly uimage2D top_layer;
-layout(set = 0, binding = 6, rgba32f) uniform writeonly image2D albedo;    // a: roughness
-layout(set = 0, binding = 7, rgba32f) uniform writeonly image2D emission;  // a: 1 where the alpha test lets the place be
+layout(set = 0, binding = 6, rgba32f) uniform writeonly image2D hit_albedo;    // a: roughness
+layout(set = 0, binding = 7, rgba32f) uniform writeonly image2D hit_emission_and_cover;  // a: 1 where the alpha test lets the place be
 #ifdef MATERIAL_SLICES
 #if MATERIAL_SLICES > 1
 layout(set = 0, binding = 8, r32ui) uniform writeonly uimage2DArray material_slices;
@@ -56,8 +56,8 @@ void main() {
     imageStore(material_0, pixel, uvec4(hit.words[0]));
     imageStore(material_1, pixel, uvec4(hit.words[1]));
     imageStore(top_layer, pixel, uvec4(hit.top_layer));
-    imageStore(albedo, pixel, vec4(properties.albedo, properties.roughness));
-    imageStore(emission, pixel, vec4(properties.emission, is_covered ? 1.0 : 0.0));
+    imageStore(hit_albedo, pixel, vec4(properties.albedo, properties.roughness));
+    imageStore(hit_emission_and_cover, pixel, vec4(properties.emission, is_covered ? 1.0 : 0.0));
 #ifdef MATERIAL_SLICES
     for (int i = 0; i < MATERIAL_SLICES; ++i) {
         uint word = uint(i) + 2u < hit_word_capacity ? hit.words[i + 2] : 0u;

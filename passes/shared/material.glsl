@@ -38,13 +38,13 @@ vec3 shading_normal() {
 #else
 
 // Rows of a plain slab's blob.
-#define slab_base_color material_numbers(2u)  // rgb, alpha
-#define slab_emission material_numbers(3u)    // cd/m2; w: metallic
-#define slab_f0 material_numbers(4u)          // dielectric; w: f90
-#define slab_scales material_numbers(5u)      // roughness, occlusion strength
+#define plain_base_color material_numbers(2u)  // rgb, alpha
+#define plain_emission material_numbers(3u)    // cd/m2; w: metallic
+#define plain_f0 material_numbers(4u)          // dielectric; w: f90
+#define plain_scales material_numbers(5u)      // roughness, occlusion strength
 
 vec4 base_color() {
-    vec4 color = slab_base_color;
+    vec4 color = plain_base_color;
 #ifdef BASE_COLOR_TEXTURE
     color *= base_color_texel();
 #endif
@@ -55,7 +55,7 @@ vec4 base_color() {
 }
 
 vec3 emission() {
-    vec3 color = slab_emission.rgb;
+    vec3 color = plain_emission.rgb;
 #ifdef EMISSION_TEXTURE
     color *= emission_texel().rgb;
 #endif
@@ -66,15 +66,15 @@ vec3 emission() {
 #ifdef HAS_NORMALS
 SingleSlab evaluate_slab(vec3 color) {
     SingleSlab slab;
-    float metallic = slab_emission.w;
-    slab.roughness = slab_scales.x;
+    float metallic = plain_emission.w;
+    slab.roughness = plain_scales.x;
 #ifdef METALLIC_ROUGHNESS_TEXTURE
     vec2 texel = metallic_roughness_texel().gb;
     slab.roughness *= texel.x;
     metallic *= texel.y;
 #endif
-    vec3 f0 = slab_f0.rgb;
-    float f90 = slab_f0.w;
+    vec3 f0 = plain_f0.rgb;
+    float f90 = plain_f0.w;
 #ifdef SPECULAR_TEXTURE
     float specular = specular_texel().a;
     f0 *= specular;
@@ -89,7 +89,7 @@ SingleSlab evaluate_slab(vec3 color) {
     slab.normal = shading_normal();
     slab.occlusion = 1.0;
 #ifdef OCCLUSION_TEXTURE
-    slab.occlusion += slab_scales.y * (occlusion_texel().r - 1.0);
+    slab.occlusion += plain_scales.y * (occlusion_texel().r - 1.0);
 #endif
     return slab;
 }
