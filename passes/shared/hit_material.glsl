@@ -105,8 +105,8 @@ vec4 material_texel(int i) { return material_texel(uint(i)); }
 #define WHERE_UV1 if ((in_attributes & attribute_uv1) != 0u)
 vec4 tree_row(uint row) { return uintBitsToFloat(material_rows[material_row(6u).x + row]); }
 uint tree_texture_number(uint i) { return half_word(material_rows[material_row(6u).y + (i >> 3u)], i & 7u); }
-#define closure_texel(number, set) sample_hit(tree_texture_number(number##u), hit_uv(set##u))
+#define closure_texel(number, set) sample_hit(tree_texture_number(uint(number)), hit_uv(uint(set)))
 #define closure_texel_moved(number, set, row_0, row_1) \
-    sample_hit(tree_texture_number(number##u), hit_uv_moved(hit_uv(set##u), (row_0).xyz, (row_1).xyz))
+    sample_hit(tree_texture_number(uint(number)), hit_uv_moved(hit_uv(uint(set)), (row_0).xyz, (row_1).xyz))
 
 #endif
