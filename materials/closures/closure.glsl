@@ -26,6 +26,8 @@
 //
 //     Closure prepare_closure(Slab slab, vec3 view, float footprint)
 //         footprint: meters that a pixel (or ray cone) covers on the surface; tells what the medium scatters within it
+//     Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprint)
+//         bare: the interface without a film, where it is not the slab's (slab_fresnel)
 //     ClosureValue evaluate_closure(Closure closure, vec3 light)
 //     ClosureSample sample_closure(Closure closure, vec3 random)      random: [0, 1)^3
 //     float closure_pdf(Closure closure, vec3 light)                  solid angle, of sample_closure without mirrors
@@ -66,7 +68,8 @@ struct ClosureAlbedo {
 struct SpecularLobe {
     vec2 alpha;
     float view_length;
-    vec3 scale;   // on single scattering: compensation for multiple, share of the lobe, what fuzz lets through
+    vec3 scale;   // on single scattering: compensation for multiple, share of the lobe, what fuzz lets through; a
+                  // mirror, which lights do not meet, has 0
     vec3 albedo;  // scale included
     vec3 passed;  // 1 - albedo of the lobe alone, with all its digits
     bool is_mirror;
@@ -106,8 +109,8 @@ struct Closure {
 #endif
     float under_interface;  // share of the diffuse light that comes through a layer's interface; cover_closure
     float gloss;            // of the diffuse model
+    ChanView chan;          // over its own albedo, where Chan's is the model
     vec3 diffuse;           // albedo of what leaves where it entered
-    float diffuse_scale;    // one over the albedo of the diffuse lobe as it is
     float specular_probability;
     float diffuse_probability;
 };
@@ -119,7 +122,7 @@ SpecularLobe make_specular_lobe(Fresnel fresnel, vec3 view, float roughness, flo
     lobe.alpha = ggx_alpha(roughness, anisotropy);
     lobe.view_length = ggx_stretched_length(view, lobe.alpha);
     if (lobe.is_mirror) {
-        lobe.scale = vec3(1.0);
+        lobe.scale = vec3(0.0);
         lobe.albedo = fresnel_reflectance(fresnel, view.z);
         lobe.passed = fresnel_transmittance(fresnel, view.z);
         return lobe;
@@ -160,9 +163,9 @@ vec3 specular_tint(uint index, float view_cosine, float light_cosine) {
 #include "materials/closures/classic.glsl"
 #endif
 
-float diffuse_lobe(Closure closure, vec3 light) {
+float diffuse_lobe(Closure closure, vec3 light, float half_cosine, float normal_half) {
 #if NACRE_DIFFUSE_MODEL == 0
-    return closure.diffuse_scale * chan_diffuse(closure.view, light, closure.gloss);
+    return chan_diffuse_of(closure.chan, light.z, half_cosine, normal_half);
 #elif NACRE_DIFFUSE_MODEL == 1
     return lambert_diffuse(light);
 #else
@@ -175,6 +178,9 @@ const float mean_cosine = 0.6;
 
 // Of the interface without a film.
 Fresnel slab_fresnel(Slab slab) {
+#if !defined(NACRE_SLAB_F90) && !defined(NACRE_SLAB_F82)
+    return make_plain_fresnel(slab.f0);
+#else
     vec3 f90 = vec3(1.0);
     vec3 f82 = vec3(1.0);
 #ifdef NACRE_SLAB_F90
@@ -184,6 +190,7 @@ Fresnel slab_fresnel(Slab slab) {
     if ((slab.features & slab_f82) != 0u) f82 = slab.f82;
 #endif
     return make_fresnel(slab.f0, f90, f82);
+#endif
 }
 
 // Index of refraction of a slab's medium by the reflectance of its interface. What reflects more than diamond does is
@@ -274,7 +281,7 @@ Closure with_probabilities(Closure closure) {
     return result;
 }
 
-Closure prepare_closure(Slab slab, vec3 view, float footprint) {
+Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprint) {
     Closure closure;
     closure.features = slab.features;
     closure.view = vec3(view.x, view.y, max(view.z, smallest_cosine));
@@ -282,7 +289,7 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 #ifdef NACRE_SLAB_ANISOTROPY
     if ((slab.features & slab_anisotropy) != 0u) anisotropy = slab.anisotropy;
 #endif
-    closure.fresnel = slab_fresnel(slab);
+    closure.fresnel = bare;
 #ifdef NACRE_SLAB_THIN_FILM
     if ((slab.features & slab_thin_film) != 0u) {
         float typical = ggx_typical_cosine(min(closure.view.z, 1.0), slab.roughness * slab.roughness);
@@ -324,10 +331,10 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 #endif
 #if NACRE_DIFFUSE_MODEL == 0
     closure.gloss = chan_gloss(slab.roughness);
-    closure.diffuse_scale = 1.0 / chan_albedo_by_table(min(closure.view.z, 1.0), closure.gloss);
+    closure.chan = chan_view(closure.view.z, closure.gloss,
+                             1.0 / chan_albedo_by_table(min(closure.view.z, 1.0), closure.gloss));
 #else
     closure.gloss = slab.roughness;
-    closure.diffuse_scale = 1.0;
 #endif
     vec3 entering = passed * uncovered;
     closure.diffuse = slab.albedo * entering;
@@ -369,6 +376,10 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
     return with_probabilities(closure);
 }
 
+Closure prepare_closure(Slab slab, vec3 view, float footprint) {
+    return prepare_closure_under(slab, slab_fresnel(slab), view, footprint);
+}
+
 // A closure that is seen through layers. spread: share of what its specular lobes send that does not come along them,
 // but as diffuse light does, having been scattered or thrown back on its way. under_interface: share of its light that
 // comes through an interface, which lets little in along the surface.
@@ -403,9 +414,21 @@ float interface_factor(Closure closure, vec3 light) {
     return mix(1.0, schlick_rest(min(light.z, 1.0), 1.0 - min(light.z, 1.0)) / (1.0 - mean), closure.under_interface);
 }
 
-vec3 specular_lobe_value(SpecularLobe lobe, vec3 view, vec3 light, vec3 h) {
-    if (lobe.is_mirror) return vec3(0.0);
-    return lobe.scale * ggx_value(view, lobe.view_length, light, h, lobe.alpha);
+// Of a light above the surface.
+vec3 specular_lobe_value(Closure closure, SpecularLobe lobe, vec3 light, vec3 h) {
+#ifdef NACRE_SLAB_ANISOTROPY
+    if ((closure.features & slab_anisotropy) != 0u)
+        return lobe.scale * ggx_value(closure.view, lobe.view_length, light, h, lobe.alpha);
+#endif
+    return lobe.scale * round_ggx_value(closure.view.z, lobe.view_length, light, h, lobe.alpha.x);
+}
+
+vec3 interface_reflectance(Closure closure, float half_cosine) {
+#if defined(NACRE_SLAB_F90) || defined(NACRE_SLAB_F82) || defined(NACRE_SLAB_THIN_FILM)
+    if ((closure.features & (slab_f90 | slab_f82 | slab_thin_film)) != 0u)
+        return fresnel_reflectance(closure.fresnel, half_cosine);
+#endif
+    return plain_fresnel_reflectance(closure.fresnel, half_cosine);
 }
 
 float specular_lobe_pdf(SpecularLobe lobe, vec3 view, vec3 light, vec3 h) {
@@ -419,11 +442,16 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
     value.diffuse = vec3(0.0);
     value.subsurface = vec3(0.0);
 #ifdef NACRE_SLAB_MEDIUM
-    if (light.z < 0.0 && (closure.features & slab_medium) != 0u) value.diffuse = closure.transmission * (-light.z / pi);
+    if (light.z < 0.0 && (closure.features & slab_medium) != 0u) value.diffuse = closure.transmission * (-light.z * inverse_pi);
 #endif
     if (light.z <= 0.0) return value;
-    vec3 h = half_vector(closure.view, light);
-    vec3 lobes = specular_lobe_value(closure.specular, closure.view, light, h);
+    // Both are above the surface: their sum has a length. Half of it is the cosine to their half vector.
+    vec3 sum = closure.view + light;
+    float length_squared = dot(sum, sum);
+    float inverse_length = inversesqrt(length_squared);
+    vec3 h = sum * inverse_length;
+    float half_cosine = min(0.5 * length_squared * inverse_length, 1.0);
+    vec3 lobes = specular_lobe_value(closure, closure.specular, light, h);
 #ifdef NACRE_SLAB_GLINTS
     // The second lobe stays smooth: it is the haze around the facets.
     if ((closure.features & slab_glints) != 0u && !closure.specular.is_mirror)
@@ -432,9 +460,9 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
 #endif
 #ifdef NACRE_SLAB_SECOND_LOBE
     if ((closure.features & slab_second_lobe) != 0u)
-        lobes += specular_lobe_value(closure.second, closure.view, light, h);
+        lobes += specular_lobe_value(closure, closure.second, light, h);
 #endif
-    value.specular = lobes * fresnel_reflectance(closure.fresnel, half_vector_cosine(closure.view, light));
+    value.specular = lobes * interface_reflectance(closure, half_cosine);
 #ifdef NACRE_SLAB_SPECULAR_LUT
     if ((closure.features & slab_specular_lut) != 0u)
         value.specular *= specular_tint(closure.specular_lut, closure.view.z, light.z);
@@ -442,11 +470,11 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
 #ifdef NACRE_SLAB_FUZZ
     if ((closure.features & slab_fuzz) != 0u) value.specular += closure.fuzz * sheen_density(closure.fuzz_map, light);
 #endif
-    value.diffuse = closure.diffuse * diffuse_lobe(closure, light);
+    value.diffuse = closure.diffuse * diffuse_lobe(closure, light, half_cosine, h.z);
 #ifdef NACRE_SLAB_MEDIUM
     if ((closure.features & slab_medium) != 0u) {
-        value.diffuse += closure.thin * (light.z / pi);
-        value.subsurface = closure.subsurface * (light.z / pi);
+        value.diffuse += closure.thin * (light.z * inverse_pi);
+        value.subsurface = closure.subsurface * (light.z * inverse_pi);
     }
 #endif
     if (closure.under_interface > 0.0) {
@@ -460,7 +488,7 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
 float closure_pdf(Closure closure, vec3 light) {
 #ifdef NACRE_SLAB_MEDIUM
     if (light.z < 0.0 && (closure.features & slab_medium) != 0u)
-        return closure.transmission_probability * (-light.z / pi);
+        return closure.transmission_probability * (-light.z * inverse_pi);
 #endif
     if (light.z <= 0.0) return 0.0;
     vec3 h = half_vector(closure.view, light);
@@ -472,7 +500,7 @@ float closure_pdf(Closure closure, vec3 light) {
 #ifdef NACRE_SLAB_FUZZ
     if ((closure.features & slab_fuzz) != 0u) pdf += closure.fuzz_probability * sheen_density(closure.fuzz_map, light);
 #endif
-    return pdf + closure.diffuse_probability * light.z / pi;
+    return pdf + closure.diffuse_probability * light.z * inverse_pi;
 }
 
 ClosureSample sample_specular_lobe(SpecularLobe lobe, vec3 view, float probability, float random_x, float random_y) {
