@@ -59,7 +59,7 @@ TEST_P(Lighting, MatteBallUnderTheSun) {
 // Every pixel of a lit ball against the closure evaluated in double precision from the same G-buffer words.
 TEST_P(Lighting, AgreesWithTheClosureInDoublePrecision) {
     using materials::closures::Library;
-    const Library library;
+    Library library;
     struct Case {
         float metallic, roughness, ior, specular;
     };

@@ -197,7 +197,7 @@ glm::dvec3 in_frame_of(const glm::dvec3& normal, const glm::dvec3& direction) {
 
 double matte_value(const RenderVariant& variant, const glm::dvec3& normal, const glm::dvec3& to_viewer,
                    const glm::dvec3& to_light) {
-    const materials::closures::Library library;
+    materials::closures::Library library;
     const glm::dvec3 view = in_frame_of(normal, to_viewer), light = in_frame_of(normal, to_light);
     if ((*passes::find_profile(variant.profile))->diffuse_model == passes::DiffuseModel::lambert)
         return library.lambert_diffuse(light);
