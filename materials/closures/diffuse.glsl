@@ -25,8 +25,10 @@ float chan_sharpness(float gloss) { return max(73.2 * gloss - 21.2, 8.9); }
 float chan_sharpness_coordinate(float sharpness) { return saturated((sharpness - 8.9) / 21.9); }
 float chan_sharpness_at(float coordinate) { return 8.9 + 21.9 * coordinate; }
 
+// half_cosine and normal_half: the cosines of the half vector of two directions above the surface to these and to the
+// normal.
 float chan_retro(float half_cosine, float normal_half, float sharpness) {
-    return half_cosine * exp2(-sharpness * sqrt(max(normal_half, 0.0)));
+    return half_cosine * exp2(-sharpness * sqrt(normal_half));
 }
 
 // The model seen from one direction: what is the same for all lights.
@@ -48,10 +50,11 @@ ChanView chan_view(float view_cosine, float gloss, float scale) {
     return chan;
 }
 
-// For a light above the surface: half_cosine and normal_half are the half vector's to light and to the normal.
+// For a light above the surface; half_cosine and normal_half as in chan_retro. A cosine that rounding made larger than 1
+// does no harm.
 float chan_diffuse_of(ChanView chan, float light_cosine, float half_cosine, float normal_half) {
     float rough = half_cosine + power5(1.0 - half_cosine);
-    float glossy = 1.0 - 0.75 * power5(1.0 - min(light_cosine, 1.0));
+    float glossy = 1.0 - 0.75 * power5(1.0 - light_cosine);
     float retro = chan_retro(half_cosine, normal_half, chan.sharpness);
     return (chan.rough * rough + chan.glossy * glossy + chan.retro * retro) * light_cosine;
 }

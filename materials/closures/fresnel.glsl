@@ -40,9 +40,12 @@ Fresnel make_plain_fresnel(vec3 f0) {
     return fresnel;
 }
 
-// Of a plain one, for a cosine in [0, 1]. No digits cancel, since no channel is darker along the surface.
-vec3 plain_fresnel_reflectance(Fresnel fresnel, float cos_theta) {
-    return fresnel.normal + (fresnel.grazing - fresnel.normal) * power5(1.0 - cos_theta);
+Fresnel scaled_fresnel(Fresnel fresnel, vec3 factor) {
+    Fresnel scaled;
+    scaled.normal = fresnel.normal * factor;
+    scaled.grazing = fresnel.grazing * factor;
+    scaled.dip = fresnel.dip * factor;
+    return scaled;
 }
 
 vec3 fresnel_reflectance(Fresnel fresnel, float cos_theta) {

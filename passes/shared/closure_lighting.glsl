@@ -2,6 +2,7 @@
 #ifndef NACRE_CLOSURE_LIGHTING
 #define NACRE_CLOSURE_LIGHTING
 // Light that leaves a closure below others towards the viewer.
+#define NACRE_CLOSURE_COVERED
 #include "passes/shared/lighting.glsl"
 #include "materials/closures/operators.glsl"
 

@@ -49,25 +49,14 @@ layout(set = 0, binding = 5) uniform sampler2D shadow_maps;
 
 int cube_face(vec3 direction) {
     vec3 size = abs(direction);
-    if (size.x >= size.y && size.x >= size.z) return direction.x >= 0.0 ? 0 : 1;
-    if (size.y >= size.z) return direction.y >= 0.0 ? 2 : 3;
-    return direction.z >= 0.0 ? 4 : 5;
+    int x_face = direction.x >= 0.0 ? 0 : 1;
+    int y_face = direction.y >= 0.0 ? 2 : 3;
+    int z_face = direction.z >= 0.0 ? 4 : 5;
+    return size.x >= size.y && size.x >= size.z ? x_face : (size.y >= size.z ? y_face : z_face);
 }
 
-// Share of a light that arrives. Percentage-closer filtering with explicit fetches and weights, so that the result does not
-// depend on a device's filter: SHADOW_FILTER_WIDTH^2 bilinear taps, which is a separable kernel over one texel more.
-float shadow(Light light, vec3 position, vec3 normal, vec3 to_light, float distance_to_light) {
-    if (light.direction.w < 0.0) return 1.0;
-    int view = int(light.direction.w);
-    if (light.cone.w != 0.0) view += cube_face(position - light.position.xyz);
-    // The receiver moves off its surface by what a texel of the map covers there.
-    float texel = light.cone.z * (light.color.w == 0.0 ? 1.0 : distance_to_light);
-    float slope = 1.0 - clamp(dot(normal, to_light), 0.0, 1.0);
-    vec3 receiver = position + normal * (texel * (0.6 + 1.4 * slope) * float(SHADOW_FILTER_WIDTH + 1) * 0.5) + to_light * texel;
-    vec4 clip = shadow_views[view] * vec4(receiver, 1.0);
-    if (clip.w <= 0.0) return 1.0;
-    vec3 ndc = clip.xyz / clip.w;
-    if (ndc.z <= 0.0 || ndc.z >= 1.0) return 1.0;
+// Of a place in the shadow map of a view.
+float filtered_shadow(vec3 ndc, int view) {
     ivec2 size = textureSize(shadow_maps, 0).xy;
     vec2 texel_position = (ndc.xy * 0.5 + 0.5) * vec2(size) - 0.5 * float(SHADOW_FILTER_WIDTH);
     vec2 corner = floor(texel_position);
@@ -84,6 +73,25 @@ float shadow(Light light, vec3 position, vec3 normal, vec3 to_light, float dista
     }
     return lit / float(SHADOW_FILTER_WIDTH * SHADOW_FILTER_WIDTH);
 }
+
+// Share of a light that arrives. Percentage-closer filtering with explicit fetches and weights, so that the result does not
+// depend on a device's filter: SHADOW_FILTER_WIDTH^2 bilinear taps, which is a separable kernel over one texel more.
+// Functions here have one way out: what returns early costs more where lanes part.
+float shadow(Light light, vec3 position, vec3 normal, vec3 to_light, float distance_to_light) {
+    float lit = 1.0;
+    if (light.direction.w >= 0.0) {
+        int view = int(light.direction.w);
+        if (light.cone.w != 0.0) view += cube_face(position - light.position.xyz);
+        // The receiver moves off its surface by what a texel of the map covers there.
+        float texel = light.cone.z * (light.color.w == 0.0 ? 1.0 : distance_to_light);
+        float slope = 1.0 - clamp(dot(normal, to_light), 0.0, 1.0);
+        vec3 receiver = position + normal * (texel * (0.6 + 1.4 * slope) * float(SHADOW_FILTER_WIDTH + 1) * 0.5) + to_light * texel;
+        vec4 clip = shadow_views[view] * vec4(receiver, 1.0);
+        vec3 ndc = clip.xyz / (clip.w > 0.0 ? clip.w : 1.0);
+        if (clip.w > 0.0 && ndc.z > 0.0 && ndc.z < 1.0) lit = filtered_shadow(ndc, view);
+    }
+    return lit;
+}
 #endif
 
 // Punctual lights are infinitely small: below this roughness their highlights are smaller than a pixel.
@@ -98,11 +106,12 @@ vec3 incident_light(Light light, vec3 position, out vec3 to_light, out float dis
     if (light.color.w != 0.0) {
         vec3 offset = light.position.xyz - position;
         float distance_squared = max(dot(offset, offset), 1e-8);
-        distance_to_light = sqrt(distance_squared);
-        to_light = offset / distance_to_light;
+        float inverse_distance = inversesqrt(distance_squared);
+        distance_to_light = distance_squared * inverse_distance;
+        to_light = offset * inverse_distance;
         // Window of KHR_lights_punctual.
         float in_range = distance_squared * light.position.w;
-        incident *= clamp(1.0 - in_range * in_range, 0.0, 1.0) / distance_squared;
+        incident *= clamp(1.0 - in_range * in_range, 0.0, 1.0) * (inverse_distance * inverse_distance);
         if (light.color.w == 2.0) {
             float cone = clamp(dot(light.direction.xyz, -to_light) * light.cone.x + light.cone.y, 0.0, 1.0);
             incident *= cone * cone;
@@ -197,7 +206,7 @@ vec3 shade_slab(SingleSlab plain, vec3 position, vec3 to_viewer) {
 #ifdef SHADOW_VIEWS
         incident *= shadow(lights[i], position, plain.normal, to_light, distance_to_light);
 #endif
-        ClosureValue value = evaluate_closure(closure, light);
+        ClosureValue value = evaluate_closure_above(closure, light);
         result += incident * (value.specular + value.diffuse);
     }
 #endif
