@@ -29,14 +29,12 @@ namespace nacre::passes {
 
 class SceneMaterials {
   public:
-    /// Uploads the materials' numbers, those textures that are in `allowed_textures` (texture_bit), and those tables of
-    /// closures that are in `tables` (SceneClosures::tables() and what else is wanted).
+    /// Uploads the materials' numbers and those textures that are in `allowed_textures` (texture_bit).
     static Expected<std::unique_ptr<SceneMaterials>> create(rhi::Device& device, const scene::Scene& scene,
                                                             const std::vector<materials::SingleSlab>& slabs,
                                                             const SceneClosures& closures, const CustomKinds& kinds,
                                                             const std::vector<bool>& used,
-                                                            std::uint32_t allowed_textures, float anisotropy,
-                                                            std::uint32_t tables);
+                                                            std::uint32_t allowed_textures, float anisotropy);
     ~SceneMaterials();
     SceneMaterials(const SceneMaterials&) = delete;
     SceneMaterials& operator=(const SceneMaterials&) = delete;
@@ -52,8 +50,8 @@ class SceneMaterials {
     [[nodiscard]] const std::vector<std::uint32_t>& closure_textures_of(std::uint32_t material) const {
         return closures_[material].textures;
     }
-    /// The tables of the closures, by number (closure_table_count), and their places in textures(); those that no material
-    /// reads are not there.
+    /// The tables of the closures, by number (closure_table_count), and their places in textures(); but for the first,
+    /// which is always there, those that no material reads are not.
     [[nodiscard]] rhi::Texture table(std::uint32_t number) const { return tables_[number]; }
     [[nodiscard]] std::uint32_t table_place(std::uint32_t number) const { return table_places_[number]; }
 

@@ -123,7 +123,7 @@ class Landscape {
         for (const auto& material : scene.materials) slabs.push_back(materials::single_slab(material));
         NACRE_TRY(geometry_, passes::SceneGeometry::create(device_, scene, slabs, closures_, kinds_, 0, false));
         NACRE_TRY(materials_, passes::SceneMaterials::create(device_, scene, slabs, closures_, kinds_,
-                                                             std::vector<bool>(slabs.size(), true), 0, 1.0f, 0));
+                                                             std::vector<bool>(slabs.size(), true), 0, 1.0f));
         shaders_ = std::make_unique<passes::ShaderLibrary>(device_, nullptr);
 
         const passes::CameraBlock block = passes::camera_block(camera_above(), picture_width, picture_height);
