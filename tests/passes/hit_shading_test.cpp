@@ -284,7 +284,7 @@ TEST_P(HitShading, ManyKindsAtOnce) {
     scene::Primitive no_tangents = ball();
     no_tangents.tangents.clear();
     for (const auto& material : {coated, brushed, textured(scene, sampler), coated, built_in("complex-coat"), coated, coated,
-                                 brushed, lambert(glm::vec3(0.5f))}) {
+                                 brushed, matte(glm::vec3(0.5f))}) {
         glm::mat4 world = third;
         world[3] = glm::vec4(0.66f * static_cast<float>(i % 3 - 1), 0.66f * static_cast<float>(i / 3 - 1), 0.0f, 1.0f);
         if (i == 1) world[0] = -world[0];  // mirrored
@@ -421,7 +421,7 @@ TEST_P(HitShading, KindsOfTheProgramsOwnAreShadedAsTheyAreDrawn) {
                            .transform = {.scale = {2.0f, 3.0f}}};
     const glm::mat4 half = glm::mat4(glm::mat3(0.5f));
     int i = 0;
-    for (const auto& material : {custom(stripes), custom(std::make_shared<Flat>()), lambert(glm::vec3(0.5f)),
+    for (const auto& material : {custom(stripes), custom(std::make_shared<Flat>()), matte(glm::vec3(0.5f)),
                                  built_in("complex-coat")}) {
         glm::mat4 world = half;
         world[3] = glm::vec4(i % 2 == 0 ? -0.5f : 0.5f, i < 2 ? -0.5f : 0.5f, 0.0f, 1.0f);
@@ -480,7 +480,7 @@ TEST_P(HitShading, PropertiesCanBeAskedFor) {
     scene::Scene scene = empty_scene();
     materials::MaterialDescription metal{.name = "metal"};
     metal.roughness = 0.7f;
-    materials::MaterialDescription glowing = lambert({0.2f, 0.4f, 0.6f});
+    materials::MaterialDescription glowing = matte({0.2f, 0.4f, 0.6f});
     glowing.emissive = {5.0f, 6.0f, 7.0f};
     scene::Primitive left = scene::parallelogram({-1, -1, 0}, {1, 0, 0}, {0, 2, 0});
     scene::Primitive right = scene::parallelogram({0, -1, 0}, {1, 0, 0}, {0, 2, 0});
@@ -498,7 +498,7 @@ TEST_P(HitShading, PropertiesCanBeAskedFor) {
         EXPECT_EQ(glm::vec3(emission[at_left]), glm::vec3(0.0f));
         EXPECT_EQ(glm::vec3(emission[at_right]), glm::vec3(5.0f, 6.0f, 7.0f));
         EXPECT_EQ(emission[at_right].a, 1.0f);
-        // lambert() has no interface, or a faint one.
+        // matte() has no interface.
         EXPECT_NEAR(albedo[at_right].r, 0.2f, 0.05f);
         EXPECT_NEAR(albedo[at_right].b, 0.6f, 0.05f);
     }
@@ -517,7 +517,7 @@ TEST_P(HitShading, PropertiesCanBeAskedFor) {
 
 TEST_P(HitShading, ReadingTellsWhatIsMissing) {
     scene::Scene scene = empty_scene();
-    place(scene, ball(), add_material(scene, lambert(glm::vec3(0.5f))));
+    place(scene, ball(), add_material(scene, matte(glm::vec3(0.5f))));
     const Shot without = render(scene, {.width = 16, .height = 16, .exposure_ev = 0.0f});
     const auto not_shaded = without.renderer->read_hits("material.0");
     ASSERT_FALSE(not_shaded);
