@@ -12,7 +12,7 @@
 #endif
 #include "passes/shared/single_slab.glsl"
 
-#ifdef HAS_NORMALS
+#if defined(HAS_NORMALS) || defined(MATERIAL_KIND)
 // World; normal map and side applied.
 vec3 shading_normal() {
     vec3 normal = unit_or(in_normal, vec3(0.0, 1.0, 0.0));

@@ -9,6 +9,8 @@
 #include "materials/custom_material.h"
 #include "materials/evaluation.h"
 #include "passes/gbuffer_layout.h"
+#include "passes/hit_materials.h"
+#include "passes/shader_library.h"
 #include "scene/shapes.h"
 #include "scene/tangents.h"
 #include "tests/passes/renderer_test.h"
@@ -428,6 +430,10 @@ TEST_P(HitShading, KindsOfTheProgramsOwnAreShadedAsTheyAreDrawn) {
         place(scene, ball(), add_material(scene, material), world);
         ++i;
     }
+    // Without normals it is unlit, and still of its kind.
+    scene::Primitive bare = scene::sphere(0.2f, 16, 8);
+    bare.normals.clear(), bare.uv0.clear();
+    place(scene, bare, 0);
     scene.lights.push_back(directional_light({0, -1, -1}, 1.0f));
     if (!can_shade_hits(*this, scene)) return;
     const Shot shot = render(scene, options);
@@ -436,6 +442,9 @@ TEST_P(HitShading, KindsOfTheProgramsOwnAreShadedAsTheyAreDrawn) {
     Comparison comparison(shot);
     comparison.run(passes::PixelClass::slab);
     expect_equal(comparison, 1200, "own kinds");
+    Comparison unlit(shot);
+    unlit.run(passes::PixelClass::unlit);
+    expect_equal(unlit, 10, "own kinds without normals");
     const auto emission = comparison.hits<glm::vec4>("emission");
     int glowing = 0;
     for (const glm::vec4& value : emission) glowing += value.r == 1.8f && value.b == 0.6f ? 1 : 0;
@@ -513,6 +522,85 @@ TEST_P(HitShading, PropertiesCanBeAskedFor) {
     const glm::dvec3 expected = materials::directional_albedo(materials::shade(*flat, {0.0, 0.0, 1.0}, 2.0 / side));
     const glm::vec4 seen = Comparison(shot).hits<glm::vec4>("albedo")[32 * side + 32];
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen[c], expected[c], 2e-3) << c;
+}
+
+// Ray cones and levels that are given, against the level of the closed form: texels that a cone covers, as a power of two.
+TEST_P(HitShading, ConesAndLevelsChooseMips) {
+    scene::Scene scene = empty_scene();
+    materials::MaterialDescription material{.name = "textured"};
+    material.base_color_texture = {.image = add_noise(scene, scene::ColorSpace::linear),
+                                   .sampler = add_sampler(scene, scene::MipFilter::linear)};
+    material.metallic_roughness_texture = material.base_color_texture;
+    material.metallic_roughness_texture.transform.scale = {2.0f, 2.0f};
+    material.metallic_roughness_texture.transform.offset = {0.125f, 0.0f};
+    add_material(scene, matte(glm::vec3(0.5f)));
+    const std::uint32_t number = add_material(scene, material);
+    const auto kinds = passes::CustomKinds::choose(scene);
+    ASSERT_TRUE(kinds);
+    const passes::SceneClosures closures;
+    std::vector<materials::SingleSlab> slabs;
+    for (const auto& description : scene.materials) slabs.push_back(materials::single_slab(description));
+    auto on_device = passes::SceneMaterials::create(device(), scene, slabs, closures, *kinds,
+                                                    std::vector<bool>(slabs.size(), true), passes::all_textures, 1.0f);
+    ASSERT_TRUE(on_device) << on_device.error().message();
+    auto hits = passes::HitMaterials::create(device(), **on_device, closures, *kinds);
+    ASSERT_TRUE(hits) << hits.error().message();
+    const std::string text = R"(#version 460
+#include "passes/shared/hit_shading.glsl"
+layout(local_size_x = 1) in;
+layout(set = 0, binding = 0, std430) buffer Results { vec4 results[]; };
+void main() {
+    hit_material = MATERIAL;
+    in_attributes = attribute_normals | attribute_uv0;
+    in_uv0 = vec2(0.3, 0.6);
+#if TEXTURE_DETAIL == 1
+    in_uv0_cone = uv_cone(0.5, 0.5, 0.125);  // an eighth: two of 16 texels, and four where coordinates are doubled
+    float level = 1.0, moved_level = 2.0;
+#else
+    in_texture_level = 1.5;
+    float level = 1.5, moved_level = 1.5;
+#endif
+    results[0] = base_color();
+    results[1] = sample_table_lod(material_texture(0u), in_uv0, level);
+    results[2] = metallic_roughness_texel();
+    results[3] = sample_table_lod(material_texture(1u), 2.0 * in_uv0 + vec2(0.125, 0.0), moved_level);
+    results[4] = sample_table_lod(material_texture(0u), in_uv0, 0.0);
+}
+)";
+    for (const passes::TextureDetail detail : {passes::TextureDetail::cones, passes::TextureDetail::one_level}) {
+        std::vector<EmbeddedFile> files = kinds->files();
+        files.push_back((*hits)->file());
+        passes::ShaderLibrary shaders(device(), nullptr, {}, files);
+        auto defines = (*hits)->defines(detail);
+        defines.push_back({"MATERIAL", std::to_string(number) + "u"});
+        const auto pipeline = shaders.compute_pipeline("detail", {.name = "detail"}, {"detail.comp", defines, text});
+        ASSERT_TRUE(pipeline) << pipeline.error().message();
+        const auto buffer = device().create_buffer(
+            {.size = 80, .usage = rhi::BufferUsage::storage | rhi::BufferUsage::copy_source, .name = "results"});
+        ASSERT_TRUE(buffer);
+        const auto layout = device().bind_group_layout(shaders.get(*pipeline), 0);
+        ASSERT_TRUE(layout);
+        const auto group = device().create_bind_group(
+            {.layout = *layout, .entries = {{.binding = 0, .buffer = *buffer}}, .name = "results"});
+        ASSERT_TRUE(group);
+        rhi::CommandList list = device().create_command_list("detail");
+        list.set_pipeline(shaders.get(*pipeline));
+        list.set_bind_group(0, *group);
+        ASSERT_TRUE((*hits)->bind(list, shaders.get(*pipeline)));
+        list.dispatch({1, 1, 1});
+        ASSERT_TRUE(device().submit(std::move(list)));
+        const auto bytes = device().read_buffer(*buffer);
+        ASSERT_TRUE(bytes);
+        glm::vec4 results[5];
+        std::memcpy(results, bytes->data(), sizeof(results));
+        for (int c = 0; c < 3; ++c) {
+            EXPECT_NEAR(results[0][c], results[1][c], 2e-3f) << c;
+            EXPECT_NEAR(results[2][c], results[3][c], 2e-3f) << c;
+        }
+        EXPECT_GT(glm::distance(results[1], results[4]), 0.02f) << "levels must differ for this to tell anything";
+        device().destroy(*group);
+        device().destroy(*buffer);
+    }
 }
 
 TEST_P(HitShading, ReadingTellsWhatIsMissing) {
