@@ -200,7 +200,8 @@ class Landscape {
 
     rhi::Device& device_;
     const bool prepass_;
-    const passes::SceneClosures closures_;  ///< None: all materials are plain slabs.
+    const passes::SceneClosures closures_;
+    const passes::CustomKinds kinds_;      ///< None.
     std::unique_ptr<passes::SceneGeometry> geometry_;
     std::unique_ptr<passes::SceneMaterials> materials_;
     std::unique_ptr<passes::ShaderLibrary> shaders_;
