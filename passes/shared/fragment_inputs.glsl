@@ -70,7 +70,7 @@ float in_texture_level = 0.0;
 
 #endif
 
-#if defined(HAS_UV0) && defined(HAS_UV1)
+#if (defined(HAS_UV0) && defined(HAS_UV1)) || defined(MATERIAL_KIND)
 vec2 uv_of(int set) { return set == 0 ? in_uv0 : in_uv1; }
 #elif defined(HAS_UV0)
 vec2 uv_of(int set) { return in_uv0; }
