@@ -70,8 +70,8 @@ struct CustomMaterialData {
     AlphaMode alpha_mode = AlphaMode::opaque;
     float alpha_cutoff = 0.5f;
     bool double_sided = false;
-    bool emits = false;        ///< Otherwise the kind's emission is not asked for.
-    std::uint32_t reads = 0;   ///< CustomReads.
+    bool emits = false;       ///< Otherwise the kind's emission is not asked for.
+    std::uint32_t reads = 0;  ///< CustomReads.
 };
 
 /// See the top of this file. Objects are asked by the thread that uses the renderer.

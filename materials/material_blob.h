@@ -9,9 +9,9 @@
 #include "materials/single_slab.h"
 
 /// @file
-/// A material as shaders read it: 128 bytes that say all of it. A header, the numbers of textures in a table, and what the
-/// material's own GLSL reads; only what does not fit lies in a second buffer, its sideband. Whoever has a blob (a draw, a
-/// ray that hit something) can shade with it.
+/// A material as shaders read it: 128 bytes that say all of it. A header, the numbers of textures in a table, and what
+/// the material's own GLSL reads; only what does not fit lies in a second buffer, its sideband. Whoever has a blob (a
+/// draw, a ray that hit something) can shade with it.
 ///
 ///     MaterialBlob blob = plain_slab_blob(single_slab(description));
 ///     MaterialHeader header = blob.header();
@@ -38,7 +38,8 @@ inline constexpr std::uint32_t blob_rows = 8;
 inline constexpr std::uint32_t blob_textures = 7;
 inline constexpr std::uint32_t blob_texture_row = 1;
 inline constexpr std::uint32_t blob_payload_row = 2;  ///< First row of numbers.
-inline constexpr std::uint32_t blob_tree_row = 6;     ///< x: first row of the tree's numbers; y: of its textures, 8 to a row.
+inline constexpr std::uint32_t blob_tree_row =
+    6;  ///< x: first row of the tree's numbers; y: of its textures, 8 to a row.
 inline constexpr std::uint32_t blob_normal_scale_row = 7;  ///< x: for texture 2.
 
 /// Which GLSL shades a blob.
@@ -60,9 +61,9 @@ struct MaterialHeader {
     bool emits = false;
     float alpha_cutoff = 0.5f;
     std::uint32_t sideband = no_sideband;  ///< First row in the buffer that holds what did not fit.
-    std::uint8_t textures = 0;    ///< Bit i: texture i is there.
-    std::uint8_t second_uv = 0;   ///< Bit i: texture i is read with the second texture coordinates.
-    bool transformed = false;     ///< The sideband begins with two rows for each of 7 textures, which move coordinates.
+    std::uint8_t textures = 0;             ///< Bit i: texture i is there.
+    std::uint8_t second_uv = 0;            ///< Bit i: texture i is read with the second texture coordinates.
+    bool transformed = false;  ///< The sideband begins with two rows for each of 7 textures, which move coordinates.
 
     bool operator==(const MaterialHeader&) const = default;
 };
@@ -86,7 +87,8 @@ struct MaterialBlob {
 [[nodiscard]] glm::uvec4 texture_row(std::span<const std::uint32_t> textures);
 static_assert(sizeof(MaterialBlob) == 128);
 
-/// The numbers of a plain slab and the header as far as the slab knows it; what textures there are is for whoever has them.
+/// The numbers of a plain slab and the header as far as the slab knows it; what textures there are is for whoever has
+/// them.
 [[nodiscard]] MaterialBlob plain_slab_blob(const SingleSlab& slab);
 /// The slab of such a blob again, without its textures.
 [[nodiscard]] SingleSlab plain_slab_of(const MaterialBlob& blob);

@@ -30,8 +30,9 @@ Expected<CustomKinds> CustomKinds::choose(const scene::Scene& scene) {
                         std::move(reason), std::move(remedy));
         };
         if (!is_name(module.name)) {
-            return wrong(fmt::format("the name '{}' of its module cannot begin the names of GLSL functions", module.name),
-                         "Use letters and digits, a letter first; not 'gl' or 'nacre'.");
+            return wrong(
+                fmt::format("the name '{}' of its module cannot begin the names of GLSL functions", module.name),
+                "Use letters and digits, a letter first; not 'gl' or 'nacre'.");
         }
         materials::CustomMaterialData data = custom->data();
         if (data.sideband.size() > materials::CustomMaterialData::max_sideband) {
@@ -47,9 +48,11 @@ Expected<CustomKinds> CustomKinds::choose(const scene::Scene& scene) {
             result.texts_.push_back(std::make_unique<std::string>(module.glsl));
             sidebands.push_back(data.sideband.size());
         } else if (*result.texts_[kind] != module.glsl || sidebands[kind] != data.sideband.size()) {
-            return wrong(fmt::format("its module '{}' has another text, or another size of the sideband, in a material before it",
-                                     module.name),
-                         "Give another kind another name.");
+            return wrong(
+                fmt::format(
+                    "its module '{}' has another text, or another size of the sideband, in a material before it",
+                    module.name),
+                "Give another kind another name.");
         }
         result.materials_[i] = Material{static_cast<std::uint32_t>(kind) + 1, custom, std::move(data)};
     }

@@ -14,7 +14,8 @@
 #include "scene/scene.h"
 
 /// @file
-/// The kinds of material of the program's own (materials/custom_material.h) that a scene has, by number, and their GLSL.
+/// The kinds of material of the program's own (materials/custom_material.h) that a scene has, by number, and their
+/// GLSL.
 ///
 ///     NACRE_TRY(const CustomKinds kinds, CustomKinds::choose(scene));
 ///     kinds.kind_of(draw.material);   // 0: it is not of such a kind
@@ -45,7 +46,8 @@ class CustomKinds {
     [[nodiscard]] std::vector<EmbeddedFile> files() const;
     /// GLSL for hits of rays: functions of all kinds that call the module of one. Kinds count from 1.
     ///
-    ///     vec4 custom_base_color(uint kind); vec3 custom_emission(uint kind); SingleSlab custom_slab(uint kind, vec3 color);
+    ///     vec4 custom_base_color(uint kind); vec3 custom_emission(uint kind); SingleSlab custom_slab(uint kind, vec3
+    ///     color);
     [[nodiscard]] std::string dispatch() const;
 
   private:

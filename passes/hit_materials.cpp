@@ -19,7 +19,8 @@ Expected<std::unique_ptr<HitMaterials>> HitMaterials::create(rhi::Device& device
     // As many as there are, in steps, so that scenes share shaders.
     std::uint32_t capacity = 16;
     while (capacity < materials.table().size()) capacity *= 2;
-    NACRE_TRY(rhi::TextureTable table, rhi::TextureTable::create(device, {.set = 1, .capacity = capacity, .name = "material textures"}));
+    NACRE_TRY(rhi::TextureTable table,
+              rhi::TextureTable::create(device, {.set = 1, .capacity = capacity, .name = "material textures"}));
     result->table_ = std::make_unique<rhi::TextureTable>(std::move(table));
     for (const SceneMaterials::BoundTexture& texture : materials.table()) {
         NACRE_TRY(const std::uint32_t number, result->table_->add(texture.texture, texture.sampler));
@@ -51,9 +52,11 @@ Expected<void> HitMaterials::bind(rhi::CommandList& list, rhi::ComputePipeline p
         NACRE_TRY(const rhi::BindGroupLayout layout, device_.bind_group_layout(pipeline, 2));
         std::vector<rhi::BindGroupEntry> entries = {{.binding = 0, .buffer = materials_.block()}};
         for (const std::uint32_t table : tables_) {
-            entries.push_back({.binding = 1 + table, .texture = materials_.table(table), .sampler = materials_.table_sampler()});
+            entries.push_back(
+                {.binding = 1 + table, .texture = materials_.table(table), .sampler = materials_.table_sampler()});
         }
-        NACRE_TRY(materials_group_, device_.create_bind_group({.layout = layout, .entries = entries, .name = "materials"}));
+        NACRE_TRY(materials_group_,
+                  device_.create_bind_group({.layout = layout, .entries = entries, .name = "materials"}));
         pipeline_ = pipeline;
     }
     list.set_bind_group(1, textures_group_);

@@ -12,15 +12,15 @@
 #include "rhi/texture_table.h"
 
 /// @file
-/// The materials of a scene for shaders that draw nothing: compute shaders that trace rays, and whatever else has a place on a
-/// surface and wants to know what it looks like. passes/shared/hit_shading.glsl is the shader's side.
+/// The materials of a scene for shaders that draw nothing: compute shaders that trace rays, and whatever else has a
+/// place on a surface and wants to know what it looks like. passes/shared/hit_shading.glsl is the shader's side.
 ///
 ///     NACRE_TRY(const auto hits, HitMaterials::create(device, materials, closures, kinds));
 ///     ... compile with hits->defines(TextureDetail::differentials) and the files hits->files() ...
 ///     NACRE_CHECK(hits->bind(list, pipeline));   // sets 1 and 2
 ///
-/// Textures are found by number in an rhi::TextureTable: one unbounded array where the device has descriptor indexing, pages
-/// of equal textures elsewhere.
+/// Textures are found by number in an rhi::TextureTable: one unbounded array where the device has descriptor indexing,
+/// pages of equal textures elsewhere.
 
 namespace nacre::passes {
 
@@ -44,7 +44,8 @@ class HitMaterials {
     Expected<void> bind(rhi::CommandList& list, rhi::ComputePipeline pipeline);
 
   private:
-    explicit HitMaterials(rhi::Device& device, const SceneMaterials& materials) : device_(device), materials_(materials) {}
+    explicit HitMaterials(rhi::Device& device, const SceneMaterials& materials)
+        : device_(device), materials_(materials) {}
 
     rhi::Device& device_;
     const SceneMaterials& materials_;

@@ -10,7 +10,8 @@ constexpr std::uint64_t point_bytes = 128;  // SurfacePoint in passes/hit_shadin
 
 }  // namespace
 
-Expected<std::unique_ptr<HitShading>> HitShading::create(RenderContext& context, HitMaterials& hits, rhi::Buffer camera) {
+Expected<std::unique_ptr<HitShading>> HitShading::create(RenderContext& context, HitMaterials& hits,
+                                                         rhi::Buffer camera) {
     rhi::Device& device = context.device;
     if (!device.capabilities().storage_in_fragment) {
         return fail(ErrorCode::unsupported, "shade hits", "what the camera sees",
@@ -22,14 +23,16 @@ Expected<std::unique_ptr<HitShading>> HitShading::create(RenderContext& context,
     NACRE_TRY(result->points_, device.create_buffer({.size = point_bytes * width * height,
                                                      .usage = rhi::BufferUsage::storage,
                                                      .name = "surface points"}));
-    const auto add = [&](std::string_view name, std::uint32_t binding, rhi::Format format, std::uint32_t layers) -> Expected<void> {
+    const auto add = [&](std::string_view name, std::uint32_t binding, rhi::Format format,
+                         std::uint32_t layers) -> Expected<void> {
         Output& output = result->outputs_.emplace_back(Output{name, binding});
-        NACRE_TRY(output.texture, device.create_texture({.format = format,
-                                                         .width = width,
-                                                         .height = height,
-                                                         .layers = layers,
-                                                         .usage = rhi::TextureUsage::storage | rhi::TextureUsage::copy_source,
-                                                         .name = "hit " + std::string(name)}));
+        NACRE_TRY(output.texture,
+                  device.create_texture({.format = format,
+                                         .width = width,
+                                         .height = height,
+                                         .layers = layers,
+                                         .usage = rhi::TextureUsage::storage | rhi::TextureUsage::copy_source,
+                                         .name = "hit " + std::string(name)}));
         return {};
     };
     NACRE_CHECK(add("material.0", 3, rhi::Format::r32_uint, 1));
@@ -40,17 +43,19 @@ Expected<std::unique_ptr<HitShading>> HitShading::create(RenderContext& context,
     const SceneClosures::Lighting& stored = context.closures.lighting();
     if (stored.slices > 0) NACRE_CHECK(add("material.slices", 8, rhi::Format::r32_uint, stored.slices));
 
-    NACRE_TRY(result->points_layout_,
-              device.create_bind_group_layout(
-                  {.bindings = {{.binding = 0,
-                                 .type = rhi::BindingType::uniform_buffer,
-                                 .stages = rhi::ShaderStage::vertex | rhi::ShaderStage::fragment},
-                                {.binding = 1, .type = rhi::BindingType::storage_buffer, .stages = rhi::ShaderStage::fragment}},
-                   .name = "surface points"}));
-    NACRE_TRY(result->points_group_,
-              device.create_bind_group({.layout = result->points_layout_,
-                                        .entries = {{.binding = 0, .buffer = camera}, {.binding = 1, .buffer = result->points_}},
-                                        .name = "surface points"}));
+    NACRE_TRY(
+        result->points_layout_,
+        device.create_bind_group_layout({.bindings = {{.binding = 0,
+                                                       .type = rhi::BindingType::uniform_buffer,
+                                                       .stages = rhi::ShaderStage::vertex | rhi::ShaderStage::fragment},
+                                                      {.binding = 1,
+                                                       .type = rhi::BindingType::storage_buffer,
+                                                       .stages = rhi::ShaderStage::fragment}},
+                                         .name = "surface points"}));
+    NACRE_TRY(result->points_group_, device.create_bind_group({.layout = result->points_layout_,
+                                                               .entries = {{.binding = 0, .buffer = camera},
+                                                                           {.binding = 1, .buffer = result->points_}},
+                                                               .name = "surface points"}));
     const GeometryPassDesc desc = {.name = "surface points",
                                    .vertex_shader = "passes/hit_shading/surface_points.vert",
                                    .fragment_shader = "passes/hit_shading/surface_points.frag",
@@ -68,13 +73,15 @@ Expected<std::unique_ptr<HitShading>> HitShading::create(RenderContext& context,
                                        })));
 
     result->depth_ = context.graph.texture(context.resources.depth);
-    rhi::ShaderSource source{.path = "passes/hit_shading/hit_shading.comp", .defines = hits.defines(TextureDetail::differentials)};
+    rhi::ShaderSource source{.path = "passes/hit_shading/hit_shading.comp",
+                             .defines = hits.defines(TextureDetail::differentials)};
     if (stored.slices > 0) source.defines.push_back({"MATERIAL_SLICES", std::to_string(stored.slices)});
     if (stored.has_subsurface) source.defines.push_back({"SUBSURFACE_SLICE", std::to_string(stored.slices - 1)});
     std::vector<rhi::BindGroupEntry> entries = {{.binding = 0, .buffer = camera},
                                                 {.binding = 1, .buffer = result->points_},
                                                 {.binding = 2, .texture = result->depth_, .sampler = context.nearest}};
-    for (const Output& output : result->outputs_) entries.push_back({.binding = output.binding, .texture = output.texture});
+    for (const Output& output : result->outputs_)
+        entries.push_back({.binding = output.binding, .texture = output.texture});
     NACRE_CHECK(result->step_.prepare(context, "hit shading", source, 0, entries));
     return result;
 }

@@ -10,16 +10,16 @@
 #include "passes/render_pass.h"
 
 /// @file
-/// Shades what the camera sees a second time, as hits of rays are shaded: the rasterizer only writes down places (what it
-/// interpolates, and the number of the material), and a compute shader makes of each place and its material's blob what the
-/// base pass stores. Both results must be equal; that is what this is for.
+/// Shades what the camera sees a second time, as hits of rays are shaded: the rasterizer only writes down places (what
+/// it interpolates, and the number of the material), and a compute shader makes of each place and its material's blob
+/// what the base pass stores. Both results must be equal; that is what this is for.
 
 namespace nacre::passes {
 
 class HitShading {
   public:
-    /// `hits` outlives the object; the graph of the context has its textures. Error: unsupported where fragment shaders have
-    /// no storage buffers.
+    /// `hits` outlives the object; the graph of the context has its textures. Error: unsupported where fragment shaders
+    /// have no storage buffers.
     static Expected<std::unique_ptr<HitShading>> create(RenderContext& context, HitMaterials& hits, rhi::Buffer camera);
     ~HitShading();
     HitShading(const HitShading&) = delete;
@@ -28,8 +28,8 @@ class HitShading {
     /// After the frame's passes, in the same command list.
     Expected<void> record(rhi::CommandList& list);
 
-    /// "material.0", "material.1", "top_layer", "material.slices", "albedo" (a: roughness), "emission" (a: whether the alpha
-    /// test lets the place be). An empty handle: there is none of that name.
+    /// "material.0", "material.1", "top_layer", "material.slices", "albedo" (a: roughness), "emission" (a: whether the
+    /// alpha test lets the place be). An empty handle: there is none of that name.
     [[nodiscard]] rhi::Texture texture(std::string_view name) const;
 
   private:
