@@ -50,8 +50,8 @@ ChanView chan_view(float view_cosine, float gloss, float scale) {
     return chan;
 }
 
-// For a light above the surface; half_cosine and normal_half as in chan_retro. A cosine that rounding made larger than 1
-// does no harm.
+// For a light above the surface; half_cosine and normal_half as in chan_retro. A cosine that rounding made larger
+// than 1 does no harm.
 float chan_diffuse_of(ChanView chan, float light_cosine, float half_cosine, float normal_half) {
     float rough = half_cosine + power5(1.0 - half_cosine);
     float glossy = 1.0 - 0.75 * power5(1.0 - light_cosine);

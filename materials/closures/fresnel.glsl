@@ -66,7 +66,8 @@ vec3 fresnel_transmittance(Fresnel fresnel, float cos_theta) {
 
 // Mean over a hemisphere under diffuse light: integral of 2 c F(c).
 vec3 fresnel_mean(Fresnel fresnel) {
-    return max(fresnel.normal + (fresnel.grazing - fresnel.normal) * (1.0 / 21.0) - fresnel.dip * (1.0 / 126.0), vec3(0.0));
+    return max(fresnel.normal + (fresnel.grazing - fresnel.normal) * (1.0 / 21.0) - fresnel.dip * (1.0 / 126.0),
+               vec3(0.0));
 }
 
 // 1 - fresnel_mean.
