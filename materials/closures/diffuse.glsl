@@ -22,7 +22,8 @@ float chan_retro_amplitude(float gloss) { return max((34.5 * gloss - 59.0) * glo
 
 // Exponent of the retro-reflection: 8.9 for all rough surfaces, 30.8 where it ends.
 float chan_sharpness(float gloss) { return max(73.2 * gloss - 21.2, 8.9); }
-float chan_sharpness_coordinate(float sharpness) { return saturated((sharpness - 8.9) * (1.0 / 21.9)); }
+// In the table, which ends at 1.
+float chan_sharpness_coordinate(float sharpness) { return (sharpness - 8.9) * (1.0 / 21.9); }
 float chan_sharpness_at(float coordinate) { return 8.9 + 21.9 * coordinate; }
 
 // half_cosine and normal_half: the cosines of the half vector of two directions above the surface to these and to the
