@@ -176,17 +176,25 @@ SpecularLobe make_specular_lobe(Fresnel fresnel, vec3 view, float roughness, flo
         // All that it reflects comes along one direction.
         albedo.missing = 0.0;
         albedo.schlick = power5(1.0 - cosine);
+#ifdef NACRE_SLAB_F82
         albedo.dip = cosine * albedo.schlick * (1.0 - cosine);
+#endif
         rest = schlick_rest(cosine, 1.0 - cosine);
     }
-    vec3 single = max(fresnel.normal * rest + fresnel.grazing * albedo.schlick - fresnel.dip * albedo.dip, vec3(0.0));
-    vec3 not_single = (vec3(1.0) - fresnel.normal) * rest + (vec3(1.0) - fresnel.grazing) * albedo.schlick +
-                      fresnel.dip * albedo.dip;
+    vec3 single = fresnel.normal * rest + fresnel.grazing * albedo.schlick;
+    vec3 not_single = (vec3(1.0) - fresnel.normal) * rest + (vec3(1.0) - fresnel.grazing) * albedo.schlick;
+#ifdef NACRE_SLAB_F82
+    single = max(single - fresnel.dip * albedo.dip, vec3(0.0));
+    not_single += fresnel.dip * albedo.dip;
+#endif
     // Of what a facet sends on to others, these do not reflect.
-    vec3 lost = fresnel_mean_transmittance(fresnel) * albedo.missing;
+    vec3 entering = fresnel_mean_transmittance(fresnel);
+    vec3 lost = entering * albedo.missing;
     lobe.albedo = single * (vec3(1.0) - lost);
     lobe.passed = not_single + single * lost;
-    vec3 scale = vec3(1.0) + fresnel_mean(fresnel) * (albedo.missing / (1.0 - albedo.missing));
+    // 1 + mean reflectance * missing / (1 - missing).
+    float again = albedo.missing / (1.0 - albedo.missing);
+    vec3 scale = vec3(1.0 + again) - entering * again;
     if (lobe.is_mirror) scale = vec3(0.0);
 #ifdef NACRE_CLOSURE_CURVES
     lobe.reflectance = scaled_fresnel(fresnel, scale);
