@@ -32,7 +32,8 @@ set(public_headers
   materials/closures/blending.glsl materials/closures/operators.glsl materials/closures/table_buffers.glsl
   materials/closures/octahedral.glsl materials/closures/stored_fields.glsl materials/closures/stored_frame.glsl
   materials/closures/table_textures.glsl materials/storage_shader.h
-  materials/closures/thin_film.glsl materials/builtin_materials.h materials/description_tree.h materials/evaluation.h
+  materials/closures/conversions.glsl materials/closures/medium_inputs.glsl
+  materials/closures/thin_film.glsl materials/building_blocks.h materials/builtin_materials.h materials/conversions.h materials/description_tree.h materials/evaluation.h
   materials/layering_error.h materials/random_walk.h materials/reference_stacks.h
   materials/preview.h materials/simplification.h materials/storage.h materials/topology.h materials/tree.h
   materials/tree_json.h materials/tree_shader.h

@@ -120,7 +120,7 @@ Expected<void> check_textures(const Tree& tree, NodeIndex index) {
                               fmt::format("a texture is on '{}', whose feature the slab does not have", input.field),
                               "Set the feature's bit or remove the texture.");
             }
-            channels = field->channels;
+            channels = input.gray ? 1 : field->channels;
         } else if (input.field != "amount" || node.kind == NodeKind::layer) {
             return refuse(
                 tree, place_of(tree, index),

@@ -34,6 +34,7 @@ struct TextureInput {
     std::uint32_t channel = 0;  ///< First channel that is read, 0 (r) to 3 (a); colors read three from 0.
     float scale = 1.0f;
     float bias = 0.0f;
+    bool gray = false;  ///< Colors: `channel` alone counts, for all three.
 
     bool operator==(const TextureInput&) const = default;
 };

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/file.h"
+#include "materials/building_blocks.h"
 
 namespace nacre::materials {
 namespace {
@@ -35,10 +36,7 @@ class Reader {
         }
         MaterialFile result;
         if (document.contains("name")) NACRE_CHECK(text(document["name"], "name", result.tree.name));
-        if (document.contains("thin")) {
-            if (!document["thin"].is_boolean()) return refuse("thin", "it is no boolean", "Write true or false.");
-            result.tree.thin = document["thin"];
-        }
+        if (document.contains("thin")) NACRE_CHECK(boolean(document["thin"], "thin", result.tree.thin));
         if (document.contains("surface_thickness"))
             NACRE_CHECK(number(document["surface_thickness"], "surface_thickness", result.tree.surface_thickness));
         if (document.contains("images")) {
@@ -100,6 +98,13 @@ class Reader {
         if (!value.is_string())
             return refuse(place, fmt::format("it is a {}, not a text", value.type_name()), "Write \"...\".");
         result = value.get<std::string>();
+        return {};
+    }
+
+    Expected<void> boolean(const json& value, std::string_view place, bool& result) const {
+        if (!value.is_boolean())
+            return refuse(place, fmt::format("it is a {}, not a boolean", value.type_name()), "Write true or false.");
+        result = value;
         return {};
     }
 
@@ -184,7 +189,7 @@ class Reader {
                 const std::string at = place + ".texture";
                 NACRE_CHECK(
                     members(texture, at,
-                            {"image", "uv_set", "uv_offset", "uv_scale", "uv_rotation", "channel", "scale", "bias"}));
+                            {"image", "uv_set", "uv_offset", "uv_scale", "uv_rotation", "channel", "scale", "bias", "gray"}));
                 TextureInput read{.field = std::string(field)};
                 NACRE_CHECK(reference(texture, at, read.texture));
                 if (texture.contains("channel")) {
@@ -197,6 +202,7 @@ class Reader {
                 }
                 if (texture.contains("scale")) NACRE_CHECK(number(texture["scale"], at + ".scale", read.scale));
                 if (texture.contains("bias")) NACRE_CHECK(number(texture["bias"], at + ".bias", read.bias));
+                if (texture.contains("gray")) NACRE_CHECK(boolean(texture["gray"], at + ".gray", read.gray));
                 owner.textures.push_back(read);
             }
             if (constant == nullptr) return {};
@@ -259,11 +265,59 @@ class Reader {
         return static_cast<NodeIndex>(tree.nodes.size() - 1);
     }
 
+    Expected<void> range(float value, float minimum, float maximum, std::string_view place) const {
+        if (value >= minimum && value <= maximum) return {};
+        return refuse(place, fmt::format("it is {}", value), fmt::format("It must be in [{}, {}].", minimum, maximum));
+    }
+
+    Expected<NodeIndex> block(const BuildingBlock& kind, const json& value, const std::string& place,
+                              std::uint32_t depth, Tree& tree) const {
+        std::vector<std::string_view> known{"name"};
+        if (kind.has_base) known.emplace_back("base");
+        for (const BlockInput& item : kind.inputs) known.emplace_back(item.name);
+        NACRE_CHECK(members(value, place, known));
+        std::vector<BlockValue> values = kind.defaults;
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            const BlockInput& item = kind.inputs[i];
+            const std::string name(item.name), at = place + "." + name;
+            if (!value.contains(name)) continue;
+            const json& given = value[name];
+            if (item.kind == BlockInputKind::frame) {
+                int frame = 0;
+                NACRE_CHECK(index(given, at, tree.frames.size(), frame));
+                values[i].frame = static_cast<std::uint32_t>(frame);
+                continue;
+            }
+            if (given.is_object() && given.contains("texture") && !item.takes_texture) {
+                return refuse(at, "it takes no texture: no input of a slab is in proportion to it",
+                              "Write a number, or build the material of slabs.");
+            }
+            const std::uint32_t channels = item.kind == BlockInputKind::color ? 3 : 1;
+            Node read;
+            NACRE_CHECK(input(given, at, name, channels, read, [&](std::uint32_t channel, float number) {
+                values[i].value[static_cast<int>(channel)] = number;
+            }));
+            for (std::uint32_t channel = 0; channel < channels; ++channel)
+                NACRE_CHECK(range(values[i].value[static_cast<int>(channel)], item.minimum, item.maximum, at));
+            if (!read.textures.empty()) values[i].texture = read.textures.front();
+        }
+        NodeIndex base = 0;
+        if (kind.has_base) {
+            if (!value.contains("base")) return refuse(place, "it has no 'base'", "Write the node there.");
+            NACRE_TRY(base, node(value["base"], place + ".base", depth + 1, tree));
+        }
+        const NodeIndex result = kind.add(tree, values, base);
+        if (value.contains("name")) NACRE_CHECK(text(value["name"], place + ".name", tree.nodes[result].name));
+        return result;
+    }
+
     Expected<NodeIndex> node(const json& value, const std::string& place, std::uint32_t depth, Tree& tree) const {
-        NACRE_CHECK(members(value, place, {"slab", "mix", "layer", "coverage"}));
+        std::vector<std::string_view> kinds{"slab", "mix", "layer", "coverage"};
+        for (const BuildingBlock& known : building_blocks()) kinds.emplace_back(known.name);
+        NACRE_CHECK(members(value, place, kinds));
         if (value.size() != 1) {
             return refuse(place, fmt::format("it has {} members", value.size()),
-                          "A node has one: slab, mix, layer or coverage.");
+                          fmt::format("A node has one: {}.", fmt::join(kinds, ", ")));
         }
         const std::string kind = value.begin().key();
         const json& body = value.begin().value();
@@ -273,6 +327,7 @@ class Reader {
             return refuse(place, fmt::format("more than {} operators lie above it", max_tree_depth),
                           "Arrange the operators in a flatter tree.");
         }
+        if (const BuildingBlock* known = find_building_block(kind)) return block(*known, body, at, depth, tree);
         Node read;
         const auto child = [&](const char* name) -> Expected<NodeIndex> {
             if (!body.contains(name)) return refuse(at, fmt::format("it has no '{}'", name), "Write the node there.");
@@ -300,11 +355,8 @@ class Reader {
             }
         }
         if (body.contains("name")) NACRE_CHECK(text(body["name"], at + ".name", read.name));
-        if (body.contains("parameter_blend")) {
-            if (!body["parameter_blend"].is_boolean())
-                return refuse(at + ".parameter_blend", "it is no boolean", "Write true or false.");
-            read.parameter_blend = body["parameter_blend"];
-        }
+        if (body.contains("parameter_blend"))
+            NACRE_CHECK(boolean(body["parameter_blend"], at + ".parameter_blend", read.parameter_blend));
         tree.nodes.push_back(std::move(read));
         return static_cast<NodeIndex>(tree.nodes.size() - 1);
     }
@@ -342,6 +394,7 @@ json with_texture(json constant, const TextureInput* input) {
     if (input->channel != 0) texture["channel"] = std::string(1, channel_names[input->channel]);
     if (input->scale != 1.0f) texture["scale"] = number_json(input->scale);
     if (input->bias != 0.0f) texture["bias"] = number_json(input->bias);
+    if (input->gray) texture["gray"] = true;
     return json{{"value", std::move(constant)}, {"texture", std::move(texture)}};
 }
 
@@ -405,12 +458,6 @@ json node_json(const Tree& tree, NodeIndex index) {
     return json{{std::string(name_of(node.kind)), std::move(body)}};
 }
 
-json object_schema(json properties, json required = json::array()) {
-    json result{{"type", "object"}, {"properties", std::move(properties)}, {"additionalProperties", false}};
-    if (!required.empty()) result["required"] = std::move(required);
-    return result;
-}
-
 }  // namespace
 
 Expected<MaterialFile> parse_material(std::string_view text, std::string_view source) {
@@ -458,80 +505,6 @@ std::string material_text(const MaterialFile& file) {
         }
     }
     result["root"] = node_json(file.tree, file.tree.root);
-    return result.dump(2) + "\n";
-}
-
-std::string material_schema() {
-    const json one{{"oneOf", {json{{"type", "number"}}, json{{"const", "infinity"}}}}};
-    json placement{
-        {"image", {{"type", "integer"}, {"minimum", 0}}},
-        {"uv_set", {{"enum", {0, 1}}}},
-        {"uv_offset", {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}}},
-        {"uv_scale", {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}}},
-        {"uv_rotation", {{"type", "number"}, {"description", "radians"}}}};
-    json texture = placement, normal = placement;
-    texture.update(json{{"channel", {{"enum", {"r", "g", "b", "a"}}}},
-                        {"scale", {{"type", "number"}}},
-                        {"bias", {{"type", "number"}}}});
-    normal["strength"] = json{{"type", "number"}};
-    const json texture_ref{{"$ref", "#/$defs/texture"}};
-    const auto input = [&](json constant) {
-        json with = object_schema({{"value", constant}, {"texture", texture_ref}});
-        return json{{"oneOf", {std::move(constant), std::move(with)}}};
-    };
-    json slab{{"name", {{"type", "string"}}}, {"frame", {{"type", "integer"}, {"minimum", 0}}}};
-    json features = json::array();
-    for (const SlabFeature& feature : slab_features()) features.push_back(feature.name);
-    slab["features"] = json{{"type", "array"}, {"items", {{"enum", features}}}};
-    for (const SlabField& field : slab_fields()) {
-        json bounded{{"type", "number"}, {"minimum", field.minimum}};
-        if (std::isfinite(field.maximum)) bounded["maximum"] = field.maximum;
-        json number = std::isfinite(field.maximum) ? bounded : json{{"oneOf", {bounded, json{{"const", "infinity"}}}}};
-        if (field.channels == 1) {
-            slab[field.name] = input(number);
-        } else {
-            slab[field.name] = input(json{
-                {"oneOf", {number, json{{"type", "array"}, {"items", number}, {"minItems", 3}, {"maxItems", 3}}}}});
-        }
-    }
-    const json node{{"$ref", "#/$defs/node"}}, name{{"type", "string"}}, yes{{"type", "boolean"}};
-    const json amount = input(json{{"type", "number"}, {"minimum", 0}, {"maximum", 1}});
-    const auto only = [](const char* kind, json body) {
-        json result = object_schema(json::object(), json::array({kind}));
-        result["properties"][kind] = std::move(body);
-        return result;
-    };
-    json kinds = json::array();
-    kinds.push_back(only("slab", object_schema(std::move(slab))));
-    kinds.push_back(only(
-        "mix",
-        object_schema({{"name", name}, {"first", node}, {"second", node}, {"amount", amount}, {"parameter_blend", yes}},
-                      json::array({"first", "second", "amount"}))));
-    kinds.push_back(only(
-        "layer",
-        object_schema({{"name", name}, {"top", node}, {"base", node}, {"thickness", one}, {"parameter_blend", yes}},
-                      json::array({"top", "base"}))));
-    kinds.push_back(only(
-        "coverage", object_schema({{"name", name}, {"of", node}, {"amount", amount}}, json::array({"of", "amount"}))));
-    json schema = object_schema(
-        {{"$schema", {{"type", "string"}}},
-         {"nacre_material", {{"const", 1}}},
-         {"name", name},
-         {"thin", yes},
-         {"surface_thickness", one},
-         {"images", {{"type", "array"}, {"items", {{"type", "string"}}}}},
-         {"frames",
-          {{"type", "array"},
-           {"minItems", 1},
-           {"items", object_schema({{"normal", object_schema(std::move(normal), json::array({"image"}))},
-                                    {"rotation", {{"type", "number"}}},
-                                    {"rotation_texture", object_schema(placement, json::array({"image"}))}})}}},
-         {"root", node}},
-        json::array({"nacre_material", "root"}));
-    schema["$defs"] = json{{"node", {{"oneOf", std::move(kinds)}}},
-                           {"texture", object_schema(std::move(texture), json::array({"image"}))}};
-    json result{{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", "Material of Nacre"}};
-    result.update(schema);
     return result.dump(2) + "\n";
 }
 

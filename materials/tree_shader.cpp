@@ -70,6 +70,7 @@ class Printer {
         if (input == nullptr) return {};
         result_.textures.push_back({.node = node, .input = *input});
         constexpr const char* swizzles[] = {"x", "y", "z", "w"};
+        channels = input->gray ? 1 : channels;
         const std::string texel =
             fmt::format("tree_texture({}u).{}", result_.textures.size() - 1,
                         channels == 3 ? (input->channel == 0 ? "xyz" : "yzw") : swizzles[input->channel]);

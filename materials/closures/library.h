@@ -46,6 +46,7 @@ struct Library : Lobes {
 #include "materials/closures/closure.glsl"
 #include "materials/closures/operators.glsl"
 #include "materials/closures/blending.glsl"
+#include "materials/closures/stored_frame.glsl"
 #undef const
 #undef float
 #undef NACRE_SLAB_ANISOTROPY
