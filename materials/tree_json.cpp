@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/file.h"
+#include "core/text_position.h"
 #include "materials/building_blocks.h"
 
 namespace nacre::materials {
@@ -466,11 +467,9 @@ Expected<MaterialFile> parse_material(std::string_view text, std::string_view so
     try {
         document = json::parse(text);
     } catch (const json::parse_error& error) {
-        const std::size_t at = std::min(error.byte > 0 ? error.byte - 1 : 0, text.size());
-        const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n') + 1;
-        const std::size_t line_start = text.substr(0, at).rfind('\n');
-        const std::size_t column = at - (line_start == std::string_view::npos ? 0 : line_start + 1) + 1;
-        return reader.refuse(fmt::format("line {}, column {}", line, column), "the text is no JSON",
+        // The parser counts bytes from 1.
+        const TextPosition at = text_position(text, error.byte > 0 ? error.byte - 1 : 0);
+        return reader.refuse(fmt::format("line {}, column {}", at.line, at.column), "the text is no JSON",
                              "See docs/materials.md for the format.");
     }
     return Reader(source).file(document);

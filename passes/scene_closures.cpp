@@ -84,7 +84,11 @@ class TextWriter {
             "#include \"passes/shared/fragment_inputs.glsl\"\n#include \"materials/closures/table_textures.glsl\"\n"
             "layout(location = 5) in vec3 in_position;\n"
             "float tree_parameter(uint index) {{ return closure_numbers[index >> 2u][index & 3u]; }}\n");
-        if (has(materials::slab_specular_lut)) print("vec3 specular_lut(uint index, vec2 at) {{ return vec3(1.0); }}\n");
+        if (has(materials::slab_specular_lut)) {
+            print(
+                "layout(set = 1, binding = 4) uniform usampler2D specular_texels;\n"
+                "#include \"materials/closures/specular_tables.glsl\"\n");
+        }
         if (has(materials::slab_glints)) {
             print(
                 "#ifdef HAS_UV0\n#define NACRE_TREE_GLINT_POSITION in_uv0\n#define NACRE_TREE_GLINT_DX dFdx(in_uv0)\n"
