@@ -30,12 +30,11 @@ class Builder {
         NodeIndex root = base();
         root = with_transmission(root);
         root = with_coat(root);
-        if (material_.alpha_mode != AlphaMode::opaque) {
-            const auto& texture = alpha_texture();
-            if (alpha() < 1.0f || texture.present()) {
-                root = tree_.coverage(root, alpha());
-                if (texture.present()) texture_on(root, {.field = "amount", .texture = texture, .channel = 3});
-            }
+        // A mask is there or not, which whoever draws it decides.
+        if (material_.alpha_mode == AlphaMode::blend) {
+            root = tree_.coverage(root, alpha());
+            texture_on(root, {.field = "amount", .texture = alpha_texture(), .channel = 3});
+            color_by_vertex(root, "amount");
         }
         tree_.root = root;
         for (Node& node : tree_.nodes) node.slab = clamped(node.slab);
@@ -47,6 +46,9 @@ class Builder {
         if (input.texture.present()) tree_.nodes[node].textures.push_back(std::move(input));
     }
 
+    // COLOR_0 of a mesh multiplies the base color.
+    void color_by_vertex(NodeIndex node, const char* field) { tree_.nodes[node].vertex_colored.emplace_back(field); }
+
     float alpha() const {
         return unit(material_.specular_glossiness ? material_.specular_glossiness->diffuse.a : material_.base_color.a);
     }
@@ -57,7 +59,8 @@ class Builder {
     glm::vec3 base_color() const { return unit(glm::vec3(material_.base_color)); }
 
     Tree unlit() {
-        materials::add(tree_, Unlit{.emission = {base_color(), {.texture = material_.base_color_texture}}});
+        color_by_vertex(
+            materials::add(tree_, Unlit{.emission = {base_color(), {.texture = material_.base_color_texture}}}), "emission");
         return std::move(tree_);
     }
 
@@ -142,6 +145,7 @@ class Builder {
     NodeIndex add_dielectric(const Slab& slab, const char* name) {
         const NodeIndex node = add(slab, name);
         texture_on(node, {.field = "albedo", .texture = material_.base_color_texture});
+        if (slab.albedo != glm::vec3(0.0f)) color_by_vertex(node, "albedo");
         if (material_.specular) {
             texture_on(node, {.field = "f0", .texture = material_.specular->color_texture});
         }
@@ -157,6 +161,7 @@ class Builder {
             slab.roughness = 1.0f - unit(material_.specular_glossiness->glossiness);
             const NodeIndex node = add(slab, "specular-glossiness");
             texture_on(node, {.field = "albedo", .texture = material_.specular_glossiness->diffuse_texture});
+            color_by_vertex(node, "albedo");
             texture_on(node, {.field = "f0", .texture = material_.specular_glossiness->specular_glossiness_texture});
             return node;
         }
@@ -169,6 +174,7 @@ class Builder {
         const auto add_metal = [&] {
             const NodeIndex node = add(metal, "metal");
             texture_on(node, {.field = "f0", .texture = material_.base_color_texture});
+            color_by_vertex(node, "f0");
             return node;
         };
         if (metallic >= 1.0f && !has_texture) return add_metal();

@@ -44,7 +44,8 @@ std::string material_schema() {
     normal["strength"] = json{{"type", "number"}};
     const json texture_ref{{"$ref", "#/$defs/texture"}};
     const auto input = [&](json constant) {
-        json with = object_schema({{"value", constant}, {"texture", texture_ref}});
+        json with =
+            object_schema({{"value", constant}, {"texture", texture_ref}, {"vertex_color", {{"type", "boolean"}}}});
         return json{{"oneOf", {std::move(constant), std::move(with)}}};
     };
     json slab{{"name", {{"type", "string"}}}, {"frame", {{"type", "integer"}, {"minimum", 0}}}};

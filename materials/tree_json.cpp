@@ -183,7 +183,11 @@ class Reader {
                          Node& owner, Set&& set) const {
         const json* constant = &value;
         if (value.is_object()) {
-            NACRE_CHECK(members(value, place, {"value", "texture"}));
+            NACRE_CHECK(members(value, place, {"value", "texture", "vertex_color"}));
+            bool colored = false;
+            if (value.contains("vertex_color"))
+                NACRE_CHECK(boolean(value["vertex_color"], place + ".vertex_color", colored));
+            if (colored) owner.vertex_colored.emplace_back(field);
             constant = value.contains("value") ? &value["value"] : nullptr;
             if (value.contains("texture")) {
                 const json& texture = value["texture"];
@@ -293,6 +297,9 @@ class Reader {
                 return refuse(at, "it takes no texture: no input of a slab is in proportion to it",
                               "Write a number, or build the material of slabs.");
             }
+            if (given.is_object() && given.contains("vertex_color")) {
+                return refuse(at, "blocks have no vertex colors", "Leave it out, or build the material of slabs.");
+            }
             const std::uint32_t channels = item.kind == BlockInputKind::color ? 3 : 1;
             Node read;
             NACRE_CHECK(input(given, at, name, channels, read, [&](std::uint32_t channel, float number) {
@@ -389,14 +396,20 @@ const TextureInput* texture_of(const Node& node, std::string_view field) {
     return found == node.textures.end() ? nullptr : &*found;
 }
 
-json with_texture(json constant, const TextureInput* input) {
-    if (input == nullptr) return constant;
-    json texture = reference_json(input->texture);
-    if (input->channel != 0) texture["channel"] = std::string(1, channel_names[input->channel]);
-    if (input->scale != 1.0f) texture["scale"] = number_json(input->scale);
-    if (input->bias != 0.0f) texture["bias"] = number_json(input->bias);
-    if (input->gray) texture["gray"] = true;
-    return json{{"value", std::move(constant)}, {"texture", std::move(texture)}};
+// The constant, or an object with what multiplies it.
+json input_json(json constant, const Node& node, std::string_view field) {
+    if (!node.varies(field)) return constant;
+    json result{{"value", std::move(constant)}};
+    if (const TextureInput* input = texture_of(node, field)) {
+        json texture = reference_json(input->texture);
+        if (input->channel != 0) texture["channel"] = std::string(1, channel_names[input->channel]);
+        if (input->scale != 1.0f) texture["scale"] = number_json(input->scale);
+        if (input->bias != 0.0f) texture["bias"] = number_json(input->bias);
+        if (input->gray) texture["gray"] = true;
+        result["texture"] = std::move(texture);
+    }
+    if (std::ranges::find(node.vertex_colored, field) != node.vertex_colored.end()) result["vertex_color"] = true;
+    return result;
 }
 
 json slab_json(const Node& node) {
@@ -408,8 +421,7 @@ json slab_json(const Node& node) {
     json fields = json::object();
     for (const SlabField& field : slab_fields()) {
         if (field.feature != 0 && (node.slab.features & field.feature) == 0) continue;
-        const TextureInput* texture = texture_of(node, field.name);
-        bool is_plain = texture == nullptr, is_gray = true;
+        bool is_plain = !node.varies(field.name), is_gray = true;
         for (std::uint32_t channel = 0; channel < field.channels; ++channel) {
             is_plain &= field.get(node.slab, channel) == field.get(plain, channel);
             is_gray &= field.get(node.slab, channel) == field.get(node.slab, 0);
@@ -422,7 +434,7 @@ json slab_json(const Node& node) {
             for (std::uint32_t channel = 0; channel < field.channels; ++channel)
                 constant.push_back(number_json(field.get(node.slab, channel)));
         }
-        fields[field.name] = with_texture(std::move(constant), texture);
+        fields[field.name] = input_json(std::move(constant), node, field.name);
     }
     json features = json::array();
     for (const SlabFeature& feature : slab_features()) {
@@ -442,7 +454,7 @@ json node_json(const Tree& tree, NodeIndex index) {
         case NodeKind::mix:
             body["first"] = node_json(tree, node.first);
             body["second"] = node_json(tree, node.second);
-            body["amount"] = with_texture(number_json(node.amount), texture_of(node, "amount"));
+            body["amount"] = input_json(number_json(node.amount), node, "amount");
             break;
         case NodeKind::layer:
             body["top"] = node_json(tree, node.first);
@@ -451,7 +463,7 @@ json node_json(const Tree& tree, NodeIndex index) {
             break;
         case NodeKind::coverage:
             body["of"] = node_json(tree, node.first);
-            body["amount"] = with_texture(number_json(node.amount), texture_of(node, "amount"));
+            body["amount"] = input_json(number_json(node.amount), node, "amount");
             break;
         case NodeKind::slab: break;
     }

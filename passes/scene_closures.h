@@ -80,7 +80,8 @@ class SceneClosures {
     [[nodiscard]] static ShadingFeatures features_of(const ClosureMaterial& material, const scene::Primitive& primitive,
                                                      bool double_sided);
 
-    /// GLSL files of all topologies: "passes/closures/base_pass_N.frag" and "passes/closures/blend_N.frag". They live
+    /// GLSL files of all topologies: "passes/closures/base_pass_N.frag", "passes/closures/blend_N.frag" and
+    /// "passes/closures/emission_N.frag". They live
     /// as long as this object.
     [[nodiscard]] std::vector<EmbeddedFile> files() const;
     /// Defines for a shader that reads stored closures.
@@ -91,6 +92,7 @@ class SceneClosures {
         std::string topology, topology_path;
         std::string base_pass, base_pass_path;
         std::string blend, blend_path;
+        std::string emission, emission_path;
     };
     std::vector<std::optional<ClosureMaterial>> materials_;
     std::vector<std::unique_ptr<Text>> texts_;

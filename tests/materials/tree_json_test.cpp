@@ -92,6 +92,10 @@ TEST(TreeJson, TextRoundTrips) {
                                                      .channel = 3,
                                                      .scale = uniform(),
                                                      .bias = uniform()});
+            if (uniform() < 0.3f)
+                tree.nodes[node].textures.push_back(
+                    {.field = "f0", .texture = {.image = 0, .sampler = 0}, .channel = 2, .gray = true});
+            if (uniform() < 0.3f) tree.nodes[node].vertex_colored.emplace_back("albedo");
             open.push_back(node);
         }
         while (open.size() > 1) {
@@ -118,7 +122,8 @@ TEST(TreeJson, TextRoundTrips) {
         ASSERT_EQ(got.size(), expected.size());
         for (std::size_t i = 0; i < got.size(); ++i) {
             EXPECT_EQ(got[i].slab, expected[i].slab);
-            EXPECT_EQ(got[i].textures, expected[i].textures);
+            EXPECT_THAT(got[i].textures, testing::UnorderedElementsAreArray(expected[i].textures));
+            EXPECT_EQ(got[i].vertex_colored, expected[i].vertex_colored);
             EXPECT_EQ(got[i].amount, expected[i].amount);
             EXPECT_EQ(got[i].thickness, expected[i].thickness);
             EXPECT_EQ(got[i].name, expected[i].name);

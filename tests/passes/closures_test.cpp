@@ -115,6 +115,34 @@ TEST_P(Closures, LightingAgreesWithWhatIsStored) {
     }
 }
 
+// A mesh with colors looks like one whose material has them.
+TEST_P(Closures, VertexColorsMultiplyTheBaseColor) {
+    const glm::vec4 color(0.5f, 0.25f, 1.0f, 1.0f);
+    for (const float metallic : {0.0f, 0.6f, 1.0f}) {
+        const auto shot_of = [&](bool by_vertex) {
+            scene::Scene scene = empty_scene();
+            materials::MaterialDescription material{.name = "coated"};
+            material.metallic = metallic;
+            material.roughness = 0.5f;
+            material.clearcoat = materials::Clearcoat{.factor = 1.0f, .roughness = 0.2f};
+            if (!by_vertex) material.base_color = color;
+            scene::Primitive shape = ball();
+            if (by_vertex) shape.colors.assign(shape.positions.size(), color);
+            place(scene, shape, add_material(scene, material));
+            scene.lights.push_back(directional_light({-0.2f, -0.3f, -1.0f}, 2.0f));
+            return render(scene, {.width = side, .height = side, .exposure_ev = 0.0f});
+        };
+        const Shot by_vertex = shot_of(true), by_material = shot_of(false);
+        glm::vec3 sum(0.0f);
+        for (std::uint32_t i = 0; i < side * side; ++i) {
+            const glm::vec3 a = by_vertex.radiance_at(i % side, i / side), b = by_material.radiance_at(i % side, i / side);
+            for (int channel = 0; channel < 3; ++channel) ASSERT_NEAR(a[channel], b[channel], 0.02f * b[channel] + 2e-3f) << i;
+            sum += b;
+        }
+        EXPECT_GT(sum.b, 1.3f * sum.g);
+    }
+}
+
 // A scene's own tables tint what reflects: red alone, or nothing at all.
 TEST_P(Closures, ReflectionsHaveTheTintsOfTheScenesTables) {
     const auto shot_of = [&](const glm::vec3& tint) {
