@@ -25,7 +25,9 @@ float largest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
 class Leaf {
   public:
     /// Sets an input and switches its feature on.
-    void set(std::string_view name, const NumberInput& input) { set(name, glm::vec3(input.value), input.texture, true); }
+    void set(std::string_view name, const NumberInput& input) {
+        set(name, glm::vec3(input.value), input.texture, true);
+    }
     void set(std::string_view name, const ColorInput& input) { set(name, input.value, input.texture, false); }
 
     /// Multiplies an input that was set before.
@@ -91,11 +93,11 @@ bool is_whole(const NumberInput& amount) { return amount.value >= 1.0f && !amoun
 struct Surface {
     ColorInput base_color;
     NumberInput metallic;
-    ColorInput f0;                                ///< Of the dielectric.
-    NumberInput dielectric_reflection{1.0f};      ///< Scales F0.
-    NumberInput metal_reflection{1.0f};           ///< Scales F0.
-    ColorInput metal_edge{glm::vec3(1.0f)};       ///< At 82 degrees.
-    NumberInput roughness, anisotropy;            ///< Kulla and Conty's.
+    ColorInput f0;                            ///< Of the dielectric.
+    NumberInput dielectric_reflection{1.0f};  ///< Scales F0.
+    NumberInput metal_reflection{1.0f};       ///< Scales F0.
+    ColorInput metal_edge{glm::vec3(1.0f)};   ///< At 82 degrees.
+    NumberInput roughness, anisotropy;        ///< Kulla and Conty's.
     NumberInput film_thickness;
     float film_ior = 1.4f;
     ColorInput emission;
@@ -183,13 +185,13 @@ NodeIndex add(Tree& tree, const Surface& surface) {
         return mix(tree, a, b, amount);
     };
     const bool is_plain = !(surface.subsurface.value > 0.0f) && !(surface.transmission.value > 0.0f);
-    NodeIndex root = mixed(surface.metallic,
-                           [&] {
-                               return mixed(
-                                   surface.transmission, [&] { return mixed(surface.subsurface, opaque, translucent); },
-                                   clear);
-                           },
-                           metal);
+    NodeIndex root = mixed(
+        surface.metallic,
+        [&] {
+            return mixed(
+                surface.transmission, [&] { return mixed(surface.subsurface, opaque, translucent); }, clear);
+        },
+        metal);
     // Metal and opaque dielectric are one slab together; what has a medium is not.
     if (is_plain && tree.nodes[root].kind == NodeKind::mix) tree.nodes[root].parameter_blend = true;
     if (has_coat) {
@@ -266,7 +268,8 @@ NodeIndex add(Tree& tree, const CoatedLayer& block, NodeIndex base) {
 
 NodeIndex add(Tree& tree, const ClearCoat& block) {
     Surface surface = surface_of(block.base);
-    surface.coat = {.coat = block.clear_coat, .coat_roughness = block.clear_coat_roughness, .coat_frame = block.coat_frame};
+    surface.coat = {
+        .coat = block.clear_coat, .coat_roughness = block.clear_coat_roughness, .coat_frame = block.coat_frame};
     return add(tree, surface);
 }
 
@@ -339,25 +342,24 @@ NodeIndex add(Tree& tree, const StandardSurface& block) {
 NodeIndex add(Tree& tree, const Principled& block) {
     const glm::vec3 color = unit(block.base_color.value), tint = tint_of(color);
     const float thickness = limited(block.thickness.value, 1e-9f, 1e12f);
-    Surface surface{.base_color = block.base_color,
-                    .metallic = block.metallic,
-                    .f0 = 0.08f * between(glm::vec3(1.0f), tint, block.specular_tint),
-                    .dielectric_reflection = block.specular,
-                    .emission = block.emission,
-                    .subsurface = block.subsurface,
-                    .subsurface_color = block.base_color,
-                    .subsurface_path = block.subsurface_radius,
-                    .transmission = block.transmission,
-                    .transmission_path = transmittance_to_mean_free_path(color, thickness),
-                    .thickness = {thickness, block.thickness.texture},
-                    .fuzz_amount = block.sheen,
-                    .fuzz_color = between(glm::vec3(1.0f), tint, block.sheen_tint),
-                    .fuzz_roughness = block.sheen_roughness,
-                    .coat = {.coat = block.clearcoat,
-                             .coat_roughness = block.clearcoat_roughness,
-                             .coat_frame = block.coat_frame},
-                    .opacity = block.opacity,
-                    .frame = block.frame};
+    Surface surface{
+        .base_color = block.base_color,
+        .metallic = block.metallic,
+        .f0 = 0.08f * between(glm::vec3(1.0f), tint, block.specular_tint),
+        .dielectric_reflection = block.specular,
+        .emission = block.emission,
+        .subsurface = block.subsurface,
+        .subsurface_color = block.base_color,
+        .subsurface_path = block.subsurface_radius,
+        .transmission = block.transmission,
+        .transmission_path = transmittance_to_mean_free_path(color, thickness),
+        .thickness = {thickness, block.thickness.texture},
+        .fuzz_amount = block.sheen,
+        .fuzz_color = between(glm::vec3(1.0f), tint, block.sheen_tint),
+        .fuzz_roughness = block.sheen_roughness,
+        .coat = {.coat = block.clearcoat, .coat_roughness = block.clearcoat_roughness, .coat_frame = block.coat_frame},
+        .opacity = block.opacity,
+        .frame = block.frame};
     // Burley 2012: aspect = sqrt(1 - 0.9 anisotropic), alpha along is roughness^2 / aspect, across it times aspect.
     const float aspect = std::sqrt(1.0f - 0.9f * unit(block.anisotropic));
     set_stretched_roughness(surface, block.roughness, 1.0f / aspect, aspect);
@@ -377,16 +379,18 @@ struct Field {
     const char* meaning;
 };
 
-#define NACRE_INPUT(Block, field, minimum, maximum, meaning) \
-    Field<Block> { #field, minimum, maximum, [](Block& b) -> auto& { return b.field; }, meaning }
+#define NACRE_INPUT(Block, field, minimum, maximum, meaning)                 \
+    Field<Block> {                                                           \
+#field, minimum, maximum, [](Block & b) -> auto& { return b.field; } \
+        , meaning                                                            \
+    }
 
-#define NACRE_DEFAULT_LIT_INPUTS(INPUT)                                                                \
-    INPUT(base_color, 0, 1, "albedo of the dielectric, F0 of the metal"),                              \
-        INPUT(metallic, 0, 1, "share of the surface that is metal"),                                   \
-        INPUT(specular, 0, 1, "F0 of the dielectric is 0.08 times this"),                              \
-        INPUT(roughness, 0, 1, "perceptual"), INPUT(anisotropy, -1, 1, "along the tangent"),           \
-        INPUT(emission, 0, infinity, "cd/m2"), INPUT(opacity, 0, 1, "coverage"),                       \
-        INPUT(frame, 0, infinity, "which of the file's tangent frames")
+#define NACRE_DEFAULT_LIT_INPUTS(INPUT)                                                                         \
+    INPUT(base_color, 0, 1, "albedo of the dielectric, F0 of the metal"),                                       \
+        INPUT(metallic, 0, 1, "share of the surface that is metal"),                                            \
+        INPUT(specular, 0, 1, "F0 of the dielectric is 0.08 times this"), INPUT(roughness, 0, 1, "perceptual"), \
+        INPUT(anisotropy, -1, 1, "along the tangent"), INPUT(emission, 0, infinity, "cd/m2"),                   \
+        INPUT(opacity, 0, 1, "coverage"), INPUT(frame, 0, infinity, "which of the file's tangent frames")
 
 #define NACRE_LIT(field, minimum, maximum, meaning) NACRE_INPUT(DefaultLit, field, minimum, maximum, meaning)
 const Field<DefaultLit> default_lit[] = {NACRE_DEFAULT_LIT_INPUTS(NACRE_LIT)};
@@ -406,8 +410,11 @@ const Field<CoatedLayer> coated_layer[] = {
     NACRE_INPUT(CoatedLayer, coat_frame, 0, infinity, "which of the file's tangent frames"),
 };
 
-#define NACRE_LIT(field, minimum, maximum, meaning) \
-    Field<ClearCoat> { #field, minimum, maximum, [](ClearCoat& b) -> auto& { return b.base.field; }, meaning }
+#define NACRE_LIT(field, minimum, maximum, meaning)                                   \
+    Field<ClearCoat> {                                                                \
+#field, minimum, maximum, [](ClearCoat & b) -> auto& { return b.base.field; } \
+        , meaning                                                                     \
+    }
 const Field<ClearCoat> clear_coat[] = {
     NACRE_DEFAULT_LIT_INPUTS(NACRE_LIT),
     NACRE_INPUT(ClearCoat, clear_coat, 0, 1, "share of the surface that is coated"),
@@ -429,33 +436,33 @@ const Field<Cloth> cloth[] = {
     NACRE_INPUT(Cloth, frame, 0, infinity, "which of the file's tangent frames"),
 };
 
-#define NACRE_STANDARD_INPUTS                                                                                     \
-    NACRE_INPUT(StandardSurface, base_weight, 0, 1, "scales base_color"),                                         \
-        NACRE_INPUT(StandardSurface, base_color, 0, 1, "albedo of the dielectric, F0 of the metal"),              \
-        NACRE_INPUT(StandardSurface, base_metalness, 0, 1, "share of the surface that is metal"),                 \
-        NACRE_INPUT(StandardSurface, specular_weight, 0, 1, "scales the reflection of both"),                     \
-        NACRE_INPUT(StandardSurface, specular_color, 0, 1, "tint of the dielectric's F0, of the metal's edge"),   \
-        NACRE_INPUT(StandardSurface, specular_roughness, 0, 1, "perceptual"),                                     \
-        NACRE_INPUT(StandardSurface, specular_roughness_anisotropy, 0, 1, "along the tangent"),                   \
-        NACRE_INPUT(StandardSurface, specular_ior, 1, infinity, "index of refraction"),                           \
-        NACRE_INPUT(StandardSurface, subsurface_weight, 0, 1, "share of the dielectric that is translucent"),     \
-        NACRE_INPUT(StandardSurface, subsurface_color, 0, 1, "its albedo"),                                       \
-        NACRE_INPUT(StandardSurface, subsurface_radius, 0, infinity, "its mean free path, meters"),               \
-        NACRE_INPUT(StandardSurface, subsurface_radius_scale, 0, 1, "for each channel"),                          \
-        NACRE_INPUT(StandardSurface, subsurface_scatter_anisotropy, -1, 1, "mean cosine of scattering"),          \
-        NACRE_INPUT(StandardSurface, coat_weight, 0, 1, "share of the surface that is coated"),                   \
-        NACRE_INPUT(StandardSurface, coat_color, 0, 1, "tint of what lies below, seen and lit straight"),         \
-        NACRE_INPUT(StandardSurface, coat_roughness, 0, 1, "perceptual"),                                         \
-        NACRE_INPUT(StandardSurface, coat_ior, 1, infinity, "index of refraction"),                               \
-        NACRE_INPUT(StandardSurface, fuzz_weight, 0, 1, "coverage of fibers on top"),                             \
-        NACRE_INPUT(StandardSurface, fuzz_color, 0, 1, "reflectance of the fibers"),                              \
-        NACRE_INPUT(StandardSurface, fuzz_roughness, 0, 1, "less is velvet, 1 is dust-like"),                     \
-        NACRE_INPUT(StandardSurface, thin_film_thickness, 0, infinity, "meters; 0: none"),                        \
-        NACRE_INPUT(StandardSurface, thin_film_ior, 1, infinity, "index of refraction"),                          \
-        NACRE_INPUT(StandardSurface, emission_luminance, 0, infinity, "cd/m2"),                                   \
-        NACRE_INPUT(StandardSurface, emission_color, 0, 1, "scales emission_luminance"),                          \
-        NACRE_INPUT(StandardSurface, geometry_opacity, 0, 1, "coverage"),                                         \
-        NACRE_INPUT(StandardSurface, frame, 0, infinity, "which of the file's tangent frames"),                   \
+#define NACRE_STANDARD_INPUTS                                                                                   \
+    NACRE_INPUT(StandardSurface, base_weight, 0, 1, "scales base_color"),                                       \
+        NACRE_INPUT(StandardSurface, base_color, 0, 1, "albedo of the dielectric, F0 of the metal"),            \
+        NACRE_INPUT(StandardSurface, base_metalness, 0, 1, "share of the surface that is metal"),               \
+        NACRE_INPUT(StandardSurface, specular_weight, 0, 1, "scales the reflection of both"),                   \
+        NACRE_INPUT(StandardSurface, specular_color, 0, 1, "tint of the dielectric's F0, of the metal's edge"), \
+        NACRE_INPUT(StandardSurface, specular_roughness, 0, 1, "perceptual"),                                   \
+        NACRE_INPUT(StandardSurface, specular_roughness_anisotropy, 0, 1, "along the tangent"),                 \
+        NACRE_INPUT(StandardSurface, specular_ior, 1, infinity, "index of refraction"),                         \
+        NACRE_INPUT(StandardSurface, subsurface_weight, 0, 1, "share of the dielectric that is translucent"),   \
+        NACRE_INPUT(StandardSurface, subsurface_color, 0, 1, "its albedo"),                                     \
+        NACRE_INPUT(StandardSurface, subsurface_radius, 0, infinity, "its mean free path, meters"),             \
+        NACRE_INPUT(StandardSurface, subsurface_radius_scale, 0, 1, "for each channel"),                        \
+        NACRE_INPUT(StandardSurface, subsurface_scatter_anisotropy, -1, 1, "mean cosine of scattering"),        \
+        NACRE_INPUT(StandardSurface, coat_weight, 0, 1, "share of the surface that is coated"),                 \
+        NACRE_INPUT(StandardSurface, coat_color, 0, 1, "tint of what lies below, seen and lit straight"),       \
+        NACRE_INPUT(StandardSurface, coat_roughness, 0, 1, "perceptual"),                                       \
+        NACRE_INPUT(StandardSurface, coat_ior, 1, infinity, "index of refraction"),                             \
+        NACRE_INPUT(StandardSurface, fuzz_weight, 0, 1, "coverage of fibers on top"),                           \
+        NACRE_INPUT(StandardSurface, fuzz_color, 0, 1, "reflectance of the fibers"),                            \
+        NACRE_INPUT(StandardSurface, fuzz_roughness, 0, 1, "less is velvet, 1 is dust-like"),                   \
+        NACRE_INPUT(StandardSurface, thin_film_thickness, 0, infinity, "meters; 0: none"),                      \
+        NACRE_INPUT(StandardSurface, thin_film_ior, 1, infinity, "index of refraction"),                        \
+        NACRE_INPUT(StandardSurface, emission_luminance, 0, infinity, "cd/m2"),                                 \
+        NACRE_INPUT(StandardSurface, emission_color, 0, 1, "scales emission_luminance"),                        \
+        NACRE_INPUT(StandardSurface, geometry_opacity, 0, 1, "coverage"),                                       \
+        NACRE_INPUT(StandardSurface, frame, 0, infinity, "which of the file's tangent frames"),                 \
         NACRE_INPUT(StandardSurface, coat_frame, 0, infinity, "the coat's tangent frame")
 
 const Field<StandardSurface> standard_surface_opaque[] = {NACRE_STANDARD_INPUTS};
@@ -525,8 +532,10 @@ NodeIndex add_by_name(Tree& tree, std::span<const BlockValue> values, NodeIndex 
     Block block;
     for (std::size_t i = 0; i < std::size(fields); ++i)
         std::visit([&](const auto& at) { write(at(block), values[i]); }, fields[i].at);
-    if constexpr (std::is_same_v<Block, CoatedLayer>) return add(tree, block, base);
-    else return add(tree, block);
+    if constexpr (std::is_same_v<Block, CoatedLayer>)
+        return add(tree, block, base);
+    else
+        return add(tree, block);
 }
 
 template <const auto& fields, typename Block>
@@ -554,7 +563,8 @@ std::span<const BuildingBlock> building_blocks() {
         block_of<clear_coat>("clear_coat", "default_lit under a clear coat", ClearCoat{}),
         block_of<cloth>("cloth", "a woven dielectric with fibers that stand on it", Cloth{}),
         block_of<standard_surface_opaque>("standard_surface_opaque", "OpenPBR without transmission", StandardSurface{}),
-        block_of<standard_surface_translucent>("standard_surface_translucent", "OpenPBR, clear unless it says otherwise",
+        block_of<standard_surface_translucent>("standard_surface_translucent",
+                                               "OpenPBR, clear unless it says otherwise",
                                                StandardSurface{.transmission_weight = 1.0f}),
         block_of<principled>("principled", "Disney's principled model", Principled{}),
     };

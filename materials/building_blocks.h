@@ -18,13 +18,14 @@
 ///     Tree tree{.name = "car paint"};
 ///     add(tree, ClearCoat{.base = {.base_color = {{0.5f, 0.02f, 0.02f}}, .roughness = 0.4f}});
 ///
-/// Inputs are numbers or linear colors with a texture that multiplies them, where the tree can have one. Where it cannot
-/// (the input becomes several of a slab's, or not in proportion), the input is a plain `float` or `glm::vec3`. Values
-/// out of the ranges stated are clamped. Lengths are meters. Two textured inputs that end in one input of a slab
-/// (`specular_weight` and `specular_color`) make a tree that validate() refuses by its name: bake them into one texture.
+/// Inputs are numbers or linear colors with a texture that multiplies them, where the tree can have one. Where it
+/// cannot (the input becomes several of a slab's, or not in proportion), the input is a plain `float` or `glm::vec3`.
+/// Values out of the ranges stated are clamped. Lengths are meters. Two textured inputs that end in one input of a slab
+/// (`specular_weight` and `specular_color`) make a tree that validate() refuses by its name: bake them into one
+/// texture.
 ///
-/// Slabs of a block share the tangent frame `frame` (index into Tree::frames), coats have `coat_frame`. Emission is seen
-/// through a coat.
+/// Slabs of a block share the tangent frame `frame` (index into Tree::frames), coats have `coat_frame`. Emission is
+/// seen through a coat.
 
 namespace nacre::materials {
 
@@ -61,8 +62,9 @@ struct Unlit {
 
 /// A clear or colored dielectric layer over whatever there is.
 struct CoatedLayer {
-    NumberInput coat{1.0f};      ///< [0, 1]: share of the surface that is coated.
-    glm::vec3 coat_color{1.0f};  ///< [0, 1]: tint of what lies below, seen and lit straight: light crosses the coat twice.
+    NumberInput coat{1.0f};  ///< [0, 1]: share of the surface that is coated.
+    glm::vec3 coat_color{
+        1.0f};  ///< [0, 1]: tint of what lies below, seen and lit straight: light crosses the coat twice.
     NumberInput coat_roughness{0.05f};  ///< [0, 1], perceptual.
     float coat_ior = 1.5f;              ///< At least 1.
     NumberInput coat_anisotropy;        ///< [-1, 1], Kulla and Conty's.
@@ -72,7 +74,7 @@ struct CoatedLayer {
 /// The default under a clear coat.
 struct ClearCoat {
     DefaultLit base;
-    NumberInput clear_coat{1.0f};            ///< [0, 1]: share of the surface that is coated.
+    NumberInput clear_coat{1.0f};             ///< [0, 1]: share of the surface that is coated.
     NumberInput clear_coat_roughness{0.05f};  ///< [0, 1], perceptual.
     std::uint32_t coat_frame = 0;
 };
@@ -91,16 +93,17 @@ struct Cloth {
 };
 
 /// The standard surface, with the names and meanings of OpenPBR 1.1 (Autodesk's Standard Surface has the same model
-/// under names like `metalness` and `specular_IOR`). Lengths are meters in place of the scene's units and of micrometers.
+/// under names like `metalness` and `specular_IOR`). Lengths are meters in place of the scene's units and of
+/// micrometers.
 ///
 /// What it has and slabs do not: `base_diffuse_roughness` (the diffuse reflection follows the specular roughness),
 /// `transmission_dispersion`, `thin_film_weight` (thickness 0 is no film), `coat_darkening` (always as much as light is
 /// thrown back), rotations (a frame's), `geometry_thin_walled` (Tree::thin, of the whole material).
 struct StandardSurface {
-    float base_weight = 1.0f;                ///< [0, 1].
-    ColorInput base_color{glm::vec3(0.8f)};  ///< [0, 1].
-    NumberInput base_metalness;              ///< [0, 1].
-    NumberInput specular_weight{1.0f};       ///< [0, 1]: scales the reflection of both metal and dielectric.
+    float base_weight = 1.0f;                    ///< [0, 1].
+    ColorInput base_color{glm::vec3(0.8f)};      ///< [0, 1].
+    NumberInput base_metalness;                  ///< [0, 1].
+    NumberInput specular_weight{1.0f};           ///< [0, 1]: scales the reflection of both metal and dielectric.
     ColorInput specular_color{glm::vec3(1.0f)};  ///< [0, 1]: tints F0 of the dielectric, and metal at 82 degrees.
     NumberInput specular_roughness{0.3f};        ///< [0, 1], perceptual.
     float specular_roughness_anisotropy = 0.0f;  ///< [0, 1], OpenPBR's: widths are converted.
@@ -109,10 +112,10 @@ struct StandardSurface {
     glm::vec3 transmission_color{1.0f};          ///< [0, 1]: of white light after `transmission_depth`.
     /// Meters after which light has the color; 0: after the thickness.
     float transmission_depth = 0.0f;
-    glm::vec3 transmission_scatter{0.0f};       ///< [0, 1]: scattering coefficient times `transmission_depth`.
-    float transmission_scatter_anisotropy = 0;  ///< (-1, 1).
-    NumberInput geometry_thickness{0.01f};      ///< Meters of the clear medium below the surface, > 0.
-    NumberInput subsurface_weight;              ///< [0, 1]: share of the diffuse dielectric that is translucent.
+    glm::vec3 transmission_scatter{0.0f};          ///< [0, 1]: scattering coefficient times `transmission_depth`.
+    float transmission_scatter_anisotropy = 0;     ///< (-1, 1).
+    NumberInput geometry_thickness{0.01f};         ///< Meters of the clear medium below the surface, > 0.
+    NumberInput subsurface_weight;                 ///< [0, 1]: share of the diffuse dielectric that is translucent.
     ColorInput subsurface_color{glm::vec3(0.8f)};  ///< [0, 1].
     NumberInput subsurface_radius{0.01f};          ///< Meters: mean free path, before its scale.
     glm::vec3 subsurface_radius_scale{1.0f, 0.5f, 0.25f};  ///< [0, 1].
@@ -149,7 +152,7 @@ struct Principled {
     NumberInput sheen_roughness{0.5f};                                ///< [0, 1].
     NumberInput clearcoat;                                            ///< [0, 1]: share that is coated (index 1.5).
     NumberInput clearcoat_roughness{0.1f};                            ///< [0, 1], perceptual.
-    NumberInput transmission;                                         ///< [0, 1]: share of the dielectric that is clear.
+    NumberInput transmission;      ///< [0, 1]: share of the dielectric that is clear.
     NumberInput thickness{0.01f};  ///< Meters of the clear medium, > 0; it has the base color after its constant value.
     ColorInput emission;           ///< cd/m2.
     NumberInput opacity{1.0f};     ///< [0, 1]: coverage.

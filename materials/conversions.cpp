@@ -58,21 +58,24 @@ glm::vec3 scattering_to_albedo(const glm::vec3& single, float phase_anisotropy, 
     const glm::dvec3 leaving = library.internal_transmittance(slab);
     glm::vec3 result;
     for (int channel = 0; channel < 3; ++channel) {
-        const double own = library.albedo_of_scattering(unit(single)[channel], limited(phase_anisotropy, -0.999f, 0.999f));
+        const double own =
+            library.albedo_of_scattering(unit(single)[channel], limited(phase_anisotropy, -0.999f, 0.999f));
         result[channel] = static_cast<float>(library.albedo_under_interface(own, leaving[channel]));
     }
     return unit(result);
 }
 
 AlbedoAndF0 metalness_to_albedo_f0(const glm::vec3& base_color, float metalness, const glm::vec3& dielectric_f0) {
-    const auto both = lobes.metalness_to_albedo_f0(unit(base_color), limited(metalness, 0.0f, 1.0f), unit(dielectric_f0));
+    const auto both =
+        lobes.metalness_to_albedo_f0(unit(base_color), limited(metalness, 0.0f, 1.0f), unit(dielectric_f0));
     return {both.albedo, both.f0};
 }
 
 void add_haze(Slab& slab, float haziness, float extent) {
     slab.features |= slab_second_lobe;
     const float brightest = std::max({slab.f0.x, slab.f0.y, slab.f0.z});
-    const auto haze = lobes.make_haze(brightest, slab.roughness, limited(haziness, 0.0f, 1.0f), limited(extent, 0.0f, 1e9f));
+    const auto haze =
+        lobes.make_haze(brightest, slab.roughness, limited(haziness, 0.0f, 1.0f), limited(extent, 0.0f, 1e9f));
     if (brightest > 0.0f) slab.f0 = unit(slab.f0 * static_cast<float>(haze.f0 / brightest));
     slab.second_roughness = static_cast<float>(haze.second_roughness);
     slab.second_weight = static_cast<float>(haze.second_weight);

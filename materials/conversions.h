@@ -6,8 +6,8 @@
 #include "materials/slab.h"
 
 /// @file
-/// What authors think in, turned into inputs of slabs, and back where that is possible. The same functions are there for
-/// generated patterns in GLSL, from the same text: materials/closures/conversions.glsl names the files.
+/// What authors think in, turned into inputs of slabs, and back where that is possible. The same functions are there
+/// for generated patterns in GLSL, from the same text: materials/closures/conversions.glsl names the files.
 ///
 ///     Slab water{.f0 = glm::vec3(ior_to_f0(1.33f)), .roughness = 0.0f, .albedo = glm::vec3(0.0f)};
 ///     water.features = slab_medium;
@@ -44,10 +44,11 @@ struct AlbedoAndF0 {
     glm::vec3 f0;
 };
 
-/// A dielectric with albedo `base_color` beside a metal with F0 `base_color` on `metalness` of the surface, in one slab:
-/// it reflects what both would, at every angle. Interpolating metalness in the usual way (albedo = base_color * (1 -
-/// metalness)) loses up to half of the light in between, which shows as a dark halo where metal meets dielectric. Where
-/// both sides differ in base color as well, convert each side first: albedo and F0 may be filtered and interpolated.
+/// A dielectric with albedo `base_color` beside a metal with F0 `base_color` on `metalness` of the surface, in one
+/// slab: it reflects what both would, at every angle. Interpolating metalness in the usual way (albedo = base_color *
+/// (1 - metalness)) loses up to half of the light in between, which shows as a dark halo where metal meets dielectric.
+/// Where both sides differ in base color as well, convert each side first: albedo and F0 may be filtered and
+/// interpolated.
 [[nodiscard]] AlbedoAndF0 metalness_to_albedo_f0(const glm::vec3& base_color, float metalness,
                                                  const glm::vec3& dielectric_f0 = glm::vec3(0.04f));
 
@@ -66,7 +67,8 @@ struct StretchedRoughness {
 /// By the GGX alphas along the tangent and along the bitangent, each in [0, 1].
 [[nodiscard]] StretchedRoughness alphas_to_roughness(float along, float across);
 
-/// Unit tangent in the surface's frame (x: tangent, y: bitangent) that is turned by `rotation` radians, counter-clockwise.
+/// Unit tangent in the surface's frame (x: tangent, y: bitangent) that is turned by `rotation` radians,
+/// counter-clockwise.
 [[nodiscard]] glm::vec3 rotation_to_tangent(float rotation);
 
 /// Back, in (-pi, pi]; 0 for the normal.

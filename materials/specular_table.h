@@ -11,8 +11,8 @@
 #include <vector>
 
 /// @file
-/// Tints of reflections by view and light: what `slab_specular_lut` looks up, Slab::specular_lut being the table's place
-/// in a list. A scene brings its own list (scene::Scene::specular_tables) or has default_specular_tables().
+/// Tints of reflections by view and light: what `slab_specular_lut` looks up, Slab::specular_lut being the table's
+/// place in a list. A scene brings its own list (scene::Scene::specular_tables) or has default_specular_tables().
 ///
 ///     scene.specular_tables = {flip_flop_table({0.9f, 0.5f, 0.1f}, {0.1f, 0.3f, 0.9f}, 3.0f)};
 ///

@@ -35,7 +35,8 @@ void expect_equal(const Tree& a, const Tree& b, double tolerance = 1e-6) {
         EXPECT_EQ(x.closures.size(), y.closures.size());
         for (const glm::dvec3& light : {glm::dvec3(0, 0, 1), glm::dvec3(-0.6, 0, 0.8), glm::dvec3(0, 0.96, 0.28)}) {
             const glm::dvec3 u = reflected(x, light), v = reflected(y, light);
-            for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(u[channel], v[channel], tolerance * (1.0 + v[channel]));
+            for (int channel = 0; channel < 3; ++channel)
+                EXPECT_NEAR(u[channel], v[channel], tolerance * (1.0 + v[channel]));
         }
     }
 }
@@ -73,15 +74,18 @@ TEST(BuildingBlocks, PrincipledWithNothingElseIsDefaultLit) {
                      tree_of_block(DefaultLit{
                          .base_color = color, .metallic = metallic, .specular = specular, .roughness = roughness}));
     }
-    expect_equal(tree_of_block(Principled{.base_color = glm::vec3(0.0f), .metallic = 0.0f, .specular = 0.0f, .roughness = 0.0f}),
-                 tree_of_block(DefaultLit{.base_color = glm::vec3(0.0f), .metallic = 0.0f, .specular = 0.0f, .roughness = 0.0f}));
+    expect_equal(
+        tree_of_block(Principled{.base_color = glm::vec3(0.0f), .metallic = 0.0f, .specular = 0.0f, .roughness = 0.0f}),
+        tree_of_block(
+            DefaultLit{.base_color = glm::vec3(0.0f), .metallic = 0.0f, .specular = 0.0f, .roughness = 0.0f}));
 }
 
 // The standard surface with index 1.5 and no weights but the base's is the same dielectric or metal.
 TEST(BuildingBlocks, StandardSurfaceHasTheSameBase) {
     const glm::vec3 color(0.7f, 0.5f, 0.2f);
     for (const float metalness : {0.0f, 0.5f, 1.0f}) {
-        expect_equal(tree_of_block(StandardSurface{.base_color = color, .base_metalness = metalness, .specular_roughness = 0.4f}),
+        expect_equal(tree_of_block(
+                         StandardSurface{.base_color = color, .base_metalness = metalness, .specular_roughness = 0.4f}),
                      tree_of_block(DefaultLit{.base_color = color, .metallic = metalness, .roughness = 0.4f}));
     }
     // Weights scale, colors tint.
@@ -199,8 +203,8 @@ TEST(BuildingBlocks, TexturesFollowTheirInputs) {
     std::vector<std::string> found;
     for (const Node& node : tree.nodes) {
         for (const TextureInput& texture : node.textures)
-            found.push_back((node.name.empty() ? std::string(name_of(node.kind)) : node.name) + "." + texture.field + " " +
-                            std::to_string(texture.texture.image) + (texture.gray ? " gray" : ""));
+            found.push_back((node.name.empty() ? std::string(name_of(node.kind)) : node.name) + "." + texture.field +
+                            " " + std::to_string(texture.texture.image) + (texture.gray ? " gray" : ""));
     }
     std::ranges::sort(found);
     EXPECT_EQ(found, (std::vector<std::string>{"clear coat.roughness 7", "coverage.amount 5", "coverage.amount 6",
@@ -237,7 +241,8 @@ TEST(BuildingBlocks, NothingIsCreated) {
                 const glm::dvec3 albedo = directional_albedo(shaded(tree, cosine), 12);
                 for (int channel = 0; channel < 3; ++channel) {
                     EXPECT_GE(albedo[channel], 0.0);
-                    EXPECT_LE(albedo[channel], 1.001) << block.name << " " << i << " at " << cosine << ": " << topology_text(tree);
+                    EXPECT_LE(albedo[channel], 1.001)
+                        << block.name << " " << i << " at " << cosine << ": " << topology_text(tree);
                     brightest = std::max(brightest, albedo[channel]);
                 }
             }

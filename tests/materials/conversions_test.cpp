@@ -60,7 +60,8 @@ TEST(Conversions, ScatteringComesBackFromTheAlbedo) {
         }
     }
     // Darker than without the interface, which throws light back to be absorbed.
-    EXPECT_LT(scattering_to_albedo(glm::vec3(0.9f), 0.0f).x, scattering_to_albedo(glm::vec3(0.9f), 0.0f, glm::vec3(0.0f)).x);
+    EXPECT_LT(scattering_to_albedo(glm::vec3(0.9f), 0.0f).x,
+              scattering_to_albedo(glm::vec3(0.9f), 0.0f, glm::vec3(0.0f)).x);
 }
 
 // One slab reflects what the metal and the dielectric beside it do, towards every view.
@@ -166,7 +167,8 @@ TEST(Conversions, ColorAndCoverageFollowTheView) {
     slab.edge_coverage = 0.9f;
     slab.edge_exponent = 3.0f;
     closures::Library library;
-    EXPECT_NEAR(library.slab_coverage(closures::Library::slab_of(slab), 0.3), view_dependent_coverage(0.2f, 0.9f, 3.0f, 0.3f), 1e-6);
+    EXPECT_NEAR(library.slab_coverage(closures::Library::slab_of(slab), 0.3),
+                view_dependent_coverage(0.2f, 0.9f, 3.0f, 0.3f), 1e-6);
 }
 
 // A film a quarter of a wave thick whose index is the root of the glass's reflects nothing of that wave.

@@ -10,7 +10,8 @@ namespace {
 
 TEST(SpecularTable, IsExactAtItsEntriesAndLinearBetween) {
     SpecularTable table;
-    for (std::uint32_t i = 0; i < table.entries.size(); ++i) table.entries[i] = glm::vec3(static_cast<float>(i) / 255.0f);
+    for (std::uint32_t i = 0; i < table.entries.size(); ++i)
+        table.entries[i] = glm::vec3(static_cast<float>(i) / 255.0f);
     EXPECT_EQ(look_up(table, {0.0, 0.0}), glm::dvec3(0.0));
     EXPECT_EQ(look_up(table, {1.0, 1.0}), glm::dvec3(1.0));
     EXPECT_NEAR(look_up(table, {1.0 / 15.0, 0.0}).x, 1.0 / 255.0, 1e-7) << "columns are views";
