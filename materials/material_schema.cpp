@@ -51,6 +51,7 @@ std::string material_schema() {
     json slab{{"name", {{"type", "string"}}}, {"frame", {{"type", "integer"}, {"minimum", 0}}}};
     json features = json::array();
     for (const SlabFeature& feature : slab_features()) features.push_back(feature.name);
+    slab["specular_lut"] = json{{"type", "integer"}, {"minimum", 0}, {"maximum", 255}};
     slab["features"] = json{{"type", "array"}, {"items", {{"enum", features}}}};
     for (const SlabField& field : slab_fields())
         slab[field.name] = input(constant_schema(field.channels, field.minimum, field.maximum));

@@ -23,6 +23,7 @@ using json = nlohmann::ordered_json;
 constexpr std::uint64_t largest_file = std::uint64_t{16} << 20;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr std::string_view channel_names = "rgba";
+constexpr std::size_t specular_lut_count = 256;  // stored in 8 bits
 
 class Reader {
   public:
@@ -232,7 +233,7 @@ class Reader {
     }
 
     Expected<NodeIndex> slab(const json& value, const std::string& place, Tree& tree) const {
-        std::vector<std::string_view> known{"name", "frame", "features"};
+        std::vector<std::string_view> known{"name", "frame", "features", "specular_lut"};
         for (const SlabField& field : slab_fields()) known.emplace_back(field.name);
         NACRE_CHECK(members(value, place, known));
         Node read;
@@ -258,6 +259,12 @@ class Reader {
                                   fmt::format("The features are {}.", fmt::join(names, ", ")));
                 }
             }
+        }
+        if (value.contains("specular_lut")) {
+            int table = 0;
+            NACRE_CHECK(index(value["specular_lut"], place + ".specular_lut", specular_lut_count, table));
+            read.slab.features |= slab_specular_lut;
+            read.slab.specular_lut = static_cast<std::uint32_t>(table);
         }
         for (const SlabField& field : slab_fields()) {
             if (!value.contains(field.name)) continue;
@@ -418,6 +425,10 @@ json slab_json(const Node& node) {
     if (!node.name.empty()) result["name"] = node.name;
     if (node.frame != 0) result["frame"] = node.frame;
     std::uint32_t shown = 0;
+    if ((node.slab.features & slab_specular_lut) != 0 && node.slab.specular_lut != 0) {
+        result["specular_lut"] = node.slab.specular_lut;
+        shown |= slab_specular_lut;
+    }
     json fields = json::object();
     for (const SlabField& field : slab_fields()) {
         if (field.feature != 0 && (node.slab.features & field.feature) == 0) continue;

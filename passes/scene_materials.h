@@ -44,8 +44,8 @@ class SceneMaterials {
     [[nodiscard]] const std::vector<std::uint32_t>& closure_textures_of(std::uint32_t material) const {
         return closures_[material].textures;
     }
-    /// The tables of the closures, by number (closure_table_count), and their places in textures(); those that no material
-    /// reads are not there.
+    /// The tables of the closures, by number (closure_table_count), and their places in textures(); but for the first,
+    /// which is always there, those that no material reads are not.
     [[nodiscard]] rhi::Texture table(std::uint32_t number) const { return tables_[number]; }
     [[nodiscard]] std::uint32_t table_place(std::uint32_t number) const { return table_places_[number]; }
 

@@ -4,15 +4,15 @@
 // The tables that the closures ask for, out of buffers that hold their words as they are, two in each uint. Who
 // includes this has declared uint interface_words[] and, where slabs have the features, anisotropy_words[] and
 // medium_words[]. Reading them interpolated is the same on every device, which a texture's filter is not.
-#ifndef interface_word
-#define interface_word(at) interface_words[at]
+#ifndef interface_pair
+#define interface_pair(at) uvec2(interface_words[2 * (at)], interface_words[2 * (at) + 1])
 #define anisotropy_word(at) anisotropy_words[at]
 #define medium_word(at) medium_words[at]
 #endif
 
 vec4 interface_entry(int column, int row) {
-    int at = 2 * (row * 64 + column);
-    return vec4(unpackUnorm2x16(interface_word(at)), unpackUnorm2x16(interface_word(at + 1)));
+    uvec2 pair = interface_pair(row * 64 + column);
+    return vec4(unpackUnorm2x16(pair.x), unpackUnorm2x16(pair.y));
 }
 
 vec4 interface_table(vec2 at) {

@@ -8,11 +8,7 @@
 #include "passes/shared/half.glsl"
 #include "passes/shared/shared_exponent.glsl"
 #include "passes/tile_classification/tiles.glsl"
-#ifdef SLAB
-#include "passes/shared/lighting.glsl"
-#endif
 #ifdef CLOSURES
-layout(set = 1, binding = 8) uniform usampler2D interface_texels;
 #ifdef NACRE_SLAB_MEDIUM
 layout(set = 1, binding = 9) uniform usampler2D medium_texels;
 #endif
@@ -23,9 +19,9 @@ layout(set = 1, binding = 10) uniform usampler2D anisotropy_texels;
 layout(set = 1, binding = 11) uniform usampler2D specular_texels;
 #include "materials/closures/specular_tables.glsl"
 #endif
-#include "materials/closures/table_textures.glsl"
-#include "materials/closures/operators.glsl"
 #include "passes/shared/closure_lighting.glsl"
+#elif defined(SLAB)
+#include "passes/shared/lighting.glsl"
 #endif
 
 layout(local_size_x = 8, local_size_y = 8) in;

@@ -12,7 +12,7 @@ namespace {
 RENDERER_SUITE(Emission);
 
 materials::MaterialDescription lamp(const glm::vec3& emission) {
-    materials::MaterialDescription material = lambert(glm::vec3(0.0f));
+    materials::MaterialDescription material = matte(glm::vec3(0.0f));
     material.emissive = emission;
     return material;
 }
@@ -22,7 +22,7 @@ scene::Primitive sheet(float z) { return scene::parallelogram({-1, -1, z}, {2, 0
 TEST_P(Emission, IsAddedToWhatIsReflected) {
     scene::Scene scene = empty_scene();
     scene.environment = uniform_environment(glm::vec3(1.0f));
-    materials::MaterialDescription material = lambert(glm::vec3(0.25f));
+    materials::MaterialDescription material = matte(glm::vec3(0.25f));
     material.emissive = {1.0f, 0.5f, 0.0f};
     material.emissive_strength = 4.0f;
     place(scene, sheet(0.0f), add_material(scene, material));
