@@ -62,7 +62,7 @@ class SceneMaterials {
     Expected<rhi::Texture> upload_image(const scene::Scene& scene, int image, bool with_mips);
     Expected<rhi::Sampler> make_sampler(const scene::Sampler& sampler, float anisotropy);
 
-    Expected<void> upload_tables(std::uint32_t tables);
+    Expected<void> upload_tables(const scene::Scene& scene, std::uint32_t tables);
     Expected<void> add_closures(const scene::Scene& scene, std::uint32_t material, const ClosureMaterial& closures,
                                 std::uint64_t block_offset, float anisotropy);
     Expected<rhi::Sampler> sampler_of(const scene::Scene& scene, int index, float anisotropy);

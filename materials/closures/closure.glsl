@@ -6,6 +6,9 @@
 #include "materials/closures/ggx.glsl"
 #include "materials/closures/slab.glsl"
 #include "materials/closures/tables.glsl"
+#ifdef NACRE_SLAB_EDGE_COVERAGE
+#include "materials/closures/conversions.glsl"
+#endif
 #ifdef NACRE_SLAB_FUZZ
 #include "materials/closures/fuzz.glsl"
 #endif
@@ -670,12 +673,7 @@ vec3 closure_throughput(Closure closure) {
 // Coverage of a slab seen from a cosine to its normal.
 float slab_coverage(Slab slab, float cos_theta) {
     if ((slab.features & slab_edge_coverage) == 0u) return slab.coverage;
-    // (1 - c)^exponent and what is left of 1: near the surface that is small, and may be all there is.
-    float steps = slab.edge_exponent * minus_log_rest(saturated(cos_theta));
-    float rest = exponential_rest(steps);
-    // Both make 1: a coverage above 1 would leave less than nothing beside it.
-    float left = steps < 0.01 ? 1.0 - rest : exp(-steps);
-    return min(slab.coverage * rest + slab.edge_coverage * left, 1.0);
+    return view_dependent_coverage(slab.coverage, slab.edge_coverage, slab.edge_exponent, cos_theta);
 }
 #endif
 
