@@ -82,7 +82,7 @@ vec3 evaluate(Prepared p, vec3 light) {
     float length_squared = dot(sum, sum);
     float inverse_length = inversesqrt(length_squared);
     vec3 h = sum * inverse_length;
-    float c = 0.5 * length_squared * inverse_length;
+    float c = min(0.5 * length_squared * inverse_length, 1.0);
     float rest = fifth_power(1.0 - c);
 
     float light_length = sqrt(p.alpha2 * dot(light.xy, light.xy) + light.z * light.z);

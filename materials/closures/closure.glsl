@@ -498,7 +498,7 @@ ClosureValue evaluate_closure_above(Closure closure, vec3 light) {
     float length_squared = dot(sum, sum);
     float inverse_length = inversesqrt(length_squared);
     vec3 h = sum * inverse_length;
-    float half_cosine = 0.5 * length_squared * inverse_length;
+    float half_cosine = min(0.5 * length_squared * inverse_length, 1.0);
     value.specular = specular_lobe_value(closure, closure.specular, light, h, half_cosine);
 #ifdef NACRE_SLAB_GLINTS
     // The second lobe stays smooth: it is the haze around the facets.

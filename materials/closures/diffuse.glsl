@@ -51,7 +51,7 @@ ChanView chan_view(float view_cosine, float gloss, float scale) {
     return chan;
 }
 
-// For a light above the surface; half_cosine and normal_half as in chan_retro. A cosine that rounding made larger
+// For a light above the surface; half_cosine and normal_half as in chan_retro. A light_cosine that rounding made larger
 // than 1 does no harm.
 float chan_diffuse_of(ChanView chan, float light_cosine, float half_cosine, float normal_half) {
     float rough = half_cosine + power5(1.0 - half_cosine);
