@@ -95,7 +95,8 @@ class TextWriter {
                 "#ifdef HAS_UV0\n#define NACRE_TREE_GLINT_POSITION in_uv0\n#define NACRE_TREE_GLINT_DX dFdx(in_uv0)\n"
                 "#define NACRE_TREE_GLINT_DY dFdy(in_uv0)\n#endif\n");
         }
-        text_ += samples_ + functions;
+        print_samples();
+        text_ += functions;
         text_ += tree.glsl;
         print_closures();
         if (material_.layout.storage_class == StorageClass::simple) {
@@ -132,6 +133,14 @@ class TextWriter {
         const auto known = std::ranges::find(material_.textures, reference);
         const auto index = static_cast<std::size_t>(known - material_.textures.begin());
         if (known == material_.textures.end()) material_.textures.push_back(reference);
+        // Several fields may be channels of one texture.
+        const auto same = std::ranges::find_if(samples_, [&](const Sample& at) {
+            return at.texture == index && std::string_view(at.without) == without;
+        });
+        if (same != samples_.end()) {
+            same->is_shared = true;
+            return fmt::format("closure_sample_{}()", same - samples_.begin());
+        }
         std::string uv = fmt::format("in_uv{}", reference.uv_set);
         if (!reference.transform.is_identity()) {
             const materials::TextureTransform& t = reference.transform;
@@ -141,11 +150,26 @@ class TextWriter {
             uv = fmt::format("vec2(dot(closure_numbers[{0}].xyz, vec3({2}, 1.0)), dot(closure_numbers[{1}].xyz, vec3({2}, 1.0)))",
                              row, row + 1, uv);
         }
-        samples_ += fmt::format(
-            "vec4 closure_sample_{0}() {{\n#ifdef HAS_UV{1}\n    return texture(closure_texture_{2}, {3});\n#else\n    return "
-            "{4};\n#endif\n}}\n",
-            sample_count_, reference.uv_set, index, uv, without);
-        return fmt::format("closure_sample_{}()", sample_count_++);
+        samples_.push_back({index, reference.uv_set, std::move(uv), without});
+        return fmt::format("closure_sample_{}()", samples_.size() - 1);
+    }
+
+    /// The functions that `sample` told of, and read_shared_texels(), which goes before them: what several fields ask
+    /// for is read once.
+    void print_samples() {
+        std::string reads;
+        for (std::size_t i = 0; i < samples_.size(); ++i) {
+            const Sample& at = samples_[i];
+            const std::string read = fmt::format("texture(closure_texture_{}, {})", at.texture, at.uv);
+            if (at.is_shared) {
+                print("vec4 shared_texel_{};\n", i);
+                reads += fmt::format("#ifdef HAS_UV{}\n    shared_texel_{} = {};\n#endif\n", at.uv_set, i, read);
+            }
+            print(
+                "vec4 closure_sample_{}() {{\n#ifdef HAS_UV{}\n    return {};\n#else\n    return {};\n#endif\n}}\n", i,
+                at.uv_set, at.is_shared ? fmt::format("shared_texel_{}", i) : read, at.without);
+        }
+        print("void read_shared_texels() {{\n{}}}\n", reads);
     }
 
     void print_frames() {
@@ -203,8 +227,15 @@ class TextWriter {
     ClosureMaterial& material_;
     const Topology& topology_;
     std::vector<float> numbers_;
-    std::string text_, samples_;
-    std::uint32_t sample_count_ = 0;
+    struct Sample {
+        std::size_t texture;  ///< Into ClosureMaterial::textures.
+        std::uint32_t uv_set;
+        std::string uv;
+        const char* without;
+        bool is_shared = false;  ///< By several fields.
+    };
+    std::string text_;
+    std::vector<Sample> samples_;
 };
 
 }  // namespace
