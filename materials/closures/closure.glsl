@@ -205,12 +205,15 @@ struct MediumScattering {
     vec3 reflected;  // back to the interface
     vec3 through;    // scattered, out of the far side
     vec3 straight;   // out of the far side without an event
+    vec3 absorbed;
+    vec3 kept;  // what is not reflected: the sum of the three above
     vec3 opaque;
 };
 
 // Light that goes up from the medium to the interface in all, where what it throws back is reflected again, and again.
-vec3 upwards_in_medium(vec3 reflected, vec3 leaving, vec3 reflected_again) {
-    return reflected / max((vec3(1.0) - reflected_again) + leaving * reflected_again, vec3(1e-9));
+// kept_again: 1 - reflected_again.
+vec3 upwards_in_medium(vec3 reflected, vec3 leaving, vec3 reflected_again, vec3 kept_again) {
+    return reflected / max(kept_again + leaving * reflected_again, vec3(1e-9));
 }
 
 // One channel. The authored albedo has the interface's part in it, which lets `leaving` of diffuse light out and throws
@@ -231,6 +234,8 @@ MediumScattering slab_scattering(Slab slab, float cosine) {
     medium.reflected = vec3(x.reflected, y.reflected, z.reflected);
     medium.through = vec3(x.through, y.through, z.through);
     medium.straight = vec3(x.straight, y.straight, z.straight);
+    medium.absorbed = vec3(x.absorbed, y.absorbed, z.absorbed);
+    medium.kept = medium.through + medium.straight + medium.absorbed;
     medium.opaque = vec3(x.opaque, y.opaque, z.opaque);
     return medium;
 }
@@ -352,7 +357,7 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
         vec3 leaving = internal_transmittance(slab);
         MediumScattering medium = slab_scattering(slab, inside);
         MediumScattering again = slab_scattering(slab, mean_cosine);
-        vec3 upwards = upwards_in_medium(medium.reflected, leaving, again.reflected);
+        vec3 upwards = upwards_in_medium(medium.reflected, leaving, again.reflected, again.kept);
         vec3 share = vec3(subsurface_share(slab.albedo.x, slab.mean_free_path.x, footprint),
                           subsurface_share(slab.albedo.y, slab.mean_free_path.y, footprint),
                           subsurface_share(slab.albedo.z, slab.mean_free_path.z, footprint));

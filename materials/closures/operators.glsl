@@ -53,11 +53,13 @@ struct Spread {
     float variance;  // that the covered share adds to it
 };
 
-// What a layer does with light from below: what it throws back, and what leaves it. The two make 1 where nothing is
-// absorbed; what the medium takes of light that leaves is not in it, but in Matter::transmittance.
+// What a layer does with light from below: what it throws back, what leaves it, and the rest, which has its own formulae:
+// light that is thrown back and forth many times shows how much is taken each time, and 1 - back - leaving would not have
+// its digits. What the medium takes of light that leaves is not in it, but in Matter::transmittance.
 struct Underside {
     vec3 back;
     vec3 leaving;
+    vec3 absorbed;
 };
 
 // A slab, or what stands for a subtree, as what lies below and above it sees it. All but coverage are those of the
@@ -71,6 +73,7 @@ struct Matter {
     Underside trapped;        // for light that comes at the angles at which it was totally reflected before
     vec3 albedo;              // reflectance for diffuse light from above
     vec3 passed;              // of diffuse light from above, what reaches the other side
+    vec3 absorbed;            // of diffuse light from above, the rest
     vec3 gloss;               // share of what is reflected towards the view that a lobe mirrors
     float alpha2;             // squared GGX alpha of that lobe, as it is seen from outside
     float ior;                // against what lies above
@@ -155,10 +158,12 @@ Matter no_matter() {
     m.view_transmittance = vec3(1.0);
     m.diffuse.back = vec3(0.0);
     m.diffuse.leaving = vec3(1.0);
+    m.diffuse.absorbed = vec3(0.0);
     m.mirrored = m.diffuse;
     m.trapped = m.diffuse;
     m.albedo = vec3(0.0);
     m.passed = vec3(1.0);
+    m.absorbed = vec3(0.0);
     m.gloss = vec3(0.0);
     m.alpha2 = 0.0;
     m.ior = 1.0;
@@ -172,6 +177,7 @@ Underside mix_underside(Underside a, Underside b, vec3 share) {
     Underside u;
     u.back = mix(a.back, b.back, share);
     u.leaving = mix(a.leaving, b.leaving, share);
+    u.absorbed = mix(a.absorbed, b.absorbed, share);
     return u;
 }
 
@@ -185,14 +191,16 @@ Path open_path() {
     return path;
 }
 
-// A medium that lets `through` pass of diffuse light and reflects `reflected`, under an interface that lets `leaving`
-// out.
-Underside underside_of(vec3 leaving, vec3 reflected, vec3 through) {
-    vec3 kept = vec3(1.0) - reflected;
+// A medium that lets `through` pass of diffuse light, takes `absorbed` and reflects the rest, `reflected`, under an
+// interface that lets `leaving` out.
+Underside underside_of(vec3 leaving, vec3 reflected, vec3 through, vec3 absorbed) {
+    vec3 kept = through + absorbed;
     vec3 between = vec3(1.0) / max(kept + leaving * reflected, vec3(1e-9));
+    vec3 down = (vec3(1.0) - leaving) * between;
     Underside u;
-    u.back = min(reflected + through * through * (vec3(1.0) - leaving) * between, vec3(1.0));
+    u.back = min(reflected + through * through * down, vec3(1.0));
     u.leaving = kept * leaving * between;
+    u.absorbed = absorbed * (kept + through) * down;
     return u;
 }
 
@@ -205,10 +213,13 @@ Matter base_matter(Slab slab, float cos_view) {
     m.ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
     m.under_interface = saturated(largest(slab.f0) / smallest_reflectance);
     vec3 leaving = internal_transmittance(slab);
-    vec3 albedo = slab.albedo;
-    vec3 out_of_medium = vec3(0.0);
+    // Of the medium, and of the medium under its interface.
     vec3 reflected = slab.albedo;
     vec3 through = vec3(0.0);
+    vec3 absorbed = vec3(1.0) - slab.albedo;
+    vec3 albedo = reflected;
+    vec3 passed = through;
+    vec3 lost = absorbed;
     vec3 scattered = vec3(1.0);
     m.transmittance = vec3(0.0);
 #ifdef NACRE_SLAB_MEDIUM
@@ -216,12 +227,14 @@ Matter base_matter(Slab slab, float cos_view) {
         MediumScattering medium = slab_scattering(slab, mean_cosine);
         reflected = medium.reflected;
         through = medium.through + medium.straight;
+        absorbed = medium.absorbed;
         scattered = medium.through / max(through, vec3(1e-30));
-        vec3 upwards = upwards_in_medium(reflected, leaving, reflected);
-        albedo = min(upwards * leaving, vec3(1.0));
-        out_of_medium = through * (vec3(1.0) + upwards * (vec3(1.0) - leaving));
+        vec3 between = vec3(1.0) / max(medium.kept + leaving * reflected, vec3(1e-9));
+        albedo = min(reflected * leaving * between, vec3(1.0));
+        passed = through * between;
+        lost = absorbed * between;
         m.transmittance =
-            exp(log(clamp(through / max(vec3(1.0) - reflected, vec3(1e-6)), vec3(1e-30), vec3(1.0))) * mean_cosine);
+            exp(log(clamp(through / max(medium.kept, vec3(1e-6)), vec3(1e-30), vec3(1.0))) * mean_cosine);
     }
 #endif
 #ifdef NACRE_SLAB_MEDIUM
@@ -229,20 +242,24 @@ Matter base_matter(Slab slab, float cos_view) {
 #endif
     Fresnel fresnel = slab_fresnel(slab);
     vec3 mean = fresnel_mean(fresnel);
-    m.albedo = mean + (vec3(1.0) - mean) * albedo;
-    m.passed = (vec3(1.0) - mean) * out_of_medium;
+    vec3 entering = fresnel_mean_transmittance(fresnel);
+    m.albedo = mean + entering * albedo;
+    m.passed = entering * passed;
+    m.absorbed = entering * lost;
     m.gloss = mean / max(m.albedo, vec3(1e-30));
-    m.diffuse = underside_of(leaving, reflected, through);
+    m.diffuse = underside_of(leaving, reflected, through, absorbed);
     // Light that was scattered on its way in is diffuse when it comes back.
-    m.mirrored =
-        mix_underside(underside_of(fresnel_transmittance(fresnel, cos_view), reflected, through), m.diffuse, scattered);
+    m.mirrored = mix_underside(underside_of(fresnel_transmittance(fresnel, cos_view), reflected, through, absorbed),
+                               m.diffuse, scattered);
     // A fit: 0.124 at index 1.5, for lobes so narrow that they hardly let anything escape that was reflected once.
-    m.trapped = mix_underside(underside_of(exp(log(leaving) * 2.3), reflected, through), m.diffuse, scattered);
+    m.trapped =
+        mix_underside(underside_of(exp(log(leaving) * 2.3), reflected, through, absorbed), m.diffuse, scattered);
 #ifdef NACRE_SLAB_FUZZ
     if ((slab.features & slab_fuzz) != 0u) {
         float fuzz = slab.fuzz_amount * sheen_albedo(mean_cosine, slab.fuzz_roughness);
         m.albedo = mix(m.albedo, slab.fuzz_color, fuzz);
         m.passed *= 1.0 - fuzz;
+        m.absorbed = mix(m.absorbed, vec3(1.0) - slab.fuzz_color, fuzz);
     }
 #endif
     return m;
@@ -264,6 +281,7 @@ struct Bounces {
     vec3 leaving;   // of what the base reflects, by its first reflection
     vec3 arriving;  // at the base, by what arrives there first
     vec3 spread;    // share of `leaving` that the first reflection's lobe does not hold any more
+    vec3 absorbed;  // of what arrives at the base first, by base, underside and Matter::transmittance of what leaves
 };
 
 Bounces bounces_between(Matter top, Matter base) {
@@ -277,8 +295,7 @@ Bounces bounces_between(Matter top, Matter base) {
     Underside returning = mix_underside(top.diffuse, top.trapped, narrow);
     Underside later = mix_underside(top.diffuse, mix_underside(top.mirrored, returning, width_later), base.gloss);
     // 1 - back * albedo by positive terms: nothing is lost where both are 1.
-    vec3 left = later.leaving + max(vec3(1.0) - later.back - later.leaving, vec3(0.0)) +
-                later.back * (vec3(1.0) - base.albedo) + vec3(1e-9);
+    vec3 left = later.leaving + later.absorbed + later.back * (base.passed + base.absorbed) + vec3(1e-9);
     vec3 again = first.back * base.albedo;
     Bounces bounces;
     vec3 again_leaving = again * (later.leaving + vec3(1e-9)) / left;
@@ -286,6 +303,12 @@ Bounces bounces_between(Matter top, Matter base) {
     // Light that was thrown back still leaves about along the lobe for more than a half (by random walks as well).
     bounces.spread = 0.4 * width_later * again_leaving / max(bounces.leaving, vec3(1e-30));
     bounces.arriving = vec3(1.0) + again / left;
+    // 1 - albedo * leaving * transmittance - passed * arriving, multiplied out.
+    vec3 taken = vec3(1.0) - top.transmittance;
+    bounces.absorbed =
+        base.absorbed +
+        base.albedo * (first.leaving * taken + first.absorbed +
+                       first.back / left * (base.absorbed + base.albedo * (later.absorbed + later.leaving * taken)));
     return bounces;
 }
 
@@ -324,6 +347,7 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     m.trapped = mix_underside(a.trapped, b.trapped, vec3(share));
     m.albedo = mix(a.albedo, b.albedo, share);
     m.passed = mix(a.passed, b.passed, share);
+    m.absorbed = mix(a.absorbed, b.absorbed, share);
     m.gloss = gloss_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
     m.alpha2 = alpha2_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
     m.ior = mix(a.ior, b.ior, share);
@@ -335,11 +359,16 @@ Matter mix_matter(Matter a, Matter b, float amount) {
 
 // The undersides of two layers, by the shares of the surface where the top, the base and both are.
 Underside layer_underside(Underside top, Underside base, Matter base_matter, float t, float b, float tb) {
-    vec3 between = vec3(1.0) / max(vec3(1.0) - base_matter.albedo * top.back, vec3(1e-6));
+    // 1 - albedo * back by positive terms.
+    vec3 between = vec3(1.0) / max(top.leaving + top.absorbed + top.back * (base_matter.passed + base_matter.absorbed),
+                                   vec3(1e-6));
     vec3 back = base.back + base.leaving * base_matter.transmittance * top.back * base_matter.passed * between;
+    vec3 taken = base_matter.absorbed + base_matter.passed * (vec3(1.0) - base_matter.transmittance);
+    vec3 absorbed = base.absorbed + base.leaving * between * (top.absorbed + top.back * taken);
     Underside u;
     u.back = t * top.back + b * base.back + tb * min(back, vec3(1.0));
     u.leaving = t * top.leaving + b * base.leaving + tb * min(base.leaving * top.leaving * between, vec3(1.0));
+    u.absorbed = t * top.absorbed + b * base.absorbed + tb * min(absorbed, vec3(1.0));
     return u;
 }
 
@@ -365,6 +394,7 @@ Matter layer_matter(Matter top, Matter base) {
     m.trapped = layer_underside(top.trapped, base.trapped, base, t, b, tb);
     m.albedo = t * top.albedo + b * base.albedo + tb * min(top.albedo + below, vec3(1.0));
     m.passed = t * top.passed + b * base.passed + tb * min(passed, vec3(1.0));
+    m.absorbed = t * top.absorbed + b * base.absorbed + tb * (top.absorbed + top.passed * bounces.absorbed);
     vec3 of_top = (t + tb) * top.albedo;
     vec3 of_base = b * base.albedo + tb * below;
     m.gloss = gloss_of_both(top, of_top, base, of_base);
