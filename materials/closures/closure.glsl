@@ -33,6 +33,7 @@
 //     vec3 closure_transmittance(Closure closure, float cos_theta)    straight through the medium, by outer direction
 //     vec3 closure_throughput(Closure closure)                        of the view: through fuzz, interface and medium
 //     float slab_coverage(Slab slab, float cos_theta)                 where a slab may have slab_edge_coverage
+//     float slab_bare(Slab slab, float cos_theta)                     the rest of the surface
 //     vec3 internal_transmittance(Slab slab)                          of diffuse light from the medium's side
 //
 // Who includes this provides the tables (materials/closures/tables.glsl, medium.glsl) and, where a slab may have
@@ -584,15 +585,27 @@ vec3 closure_throughput(Closure closure) {
 }
 
 #ifdef NACRE_SLAB_EDGE_COVERAGE
+// By how much a slab is as seen along the normal, and as along the surface: (1 - c)^exponent, which may be small near the
+// normal, and what is left of 1, which is near the surface. Both make 1: a coverage above 1 would leave less than nothing
+// beside it.
+vec2 coverage_shares(Slab slab, float cos_theta) {
+    float steps = slab.edge_exponent * minus_log_rest(saturated(cos_theta));
+    float rest = exponential_rest(steps);
+    return vec2(rest, steps < 0.01 ? 1.0 - rest : exp(-steps));
+}
+
 // Coverage of a slab seen from a cosine to its normal.
 float slab_coverage(Slab slab, float cos_theta) {
     if ((slab.features & slab_edge_coverage) == 0u) return slab.coverage;
-    // (1 - c)^exponent and what is left of 1: near the surface that is small, and may be all there is.
-    float steps = slab.edge_exponent * minus_log_rest(saturated(cos_theta));
-    float rest = exponential_rest(steps);
-    // Both make 1: a coverage above 1 would leave less than nothing beside it.
-    float left = steps < 0.01 ? 1.0 - rest : exp(-steps);
-    return min(slab.coverage * rest + slab.edge_coverage * left, 1.0);
+    vec2 shares = coverage_shares(slab, cos_theta);
+    return min(slab.coverage * shares.x + slab.edge_coverage * shares.y, 1.0);
+}
+
+// 1 - slab_coverage, with all digits where that is near 1.
+float slab_bare(Slab slab, float cos_theta) {
+    if ((slab.features & slab_edge_coverage) == 0u) return max(1.0 - slab.coverage, 0.0);
+    vec2 shares = coverage_shares(slab, cos_theta);
+    return max((1.0 - slab.coverage) * shares.x + (1.0 - slab.edge_coverage) * shares.y, 0.0);
 }
 #endif
 

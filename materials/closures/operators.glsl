@@ -62,10 +62,11 @@ struct Underside {
     vec3 absorbed;
 };
 
-// A slab, or what stands for a subtree, as what lies below and above it sees it. All but coverage are those of the
-// covered share; where nothing is covered they mean nothing.
+// A slab, or what stands for a subtree, as what lies below and above it sees it. All but coverage and bare are those of
+// the covered share; where nothing is covered they mean nothing.
 struct Matter {
     float coverage;
+    float bare;               // 1 - coverage: what lies below may be seen through nothing else
     vec3 transmittance;       // of light along the normal that is not scattered back: what the medium leaves of it
     vec3 view_transmittance;  // of what is seen through it in the view direction: interface, fuzz and medium
     Underside diffuse;        // for diffuse light from below
@@ -93,6 +94,7 @@ struct Path {
 
 #ifndef NACRE_SLAB_EDGE_COVERAGE
 float slab_coverage(Slab slab, float cos_theta) { return slab.coverage; }
+float slab_bare(Slab slab, float cos_theta) { return max(1.0 - slab.coverage, 0.0); }
 #endif
 
 Spread slab_spread(Slab slab, float cos_view) {
@@ -154,6 +156,7 @@ Slab track_slab(Slab slab, Widening widening) {
 Matter no_matter() {
     Matter m;
     m.coverage = 0.0;
+    m.bare = 1.0;
     m.transmittance = vec3(1.0);
     m.view_transmittance = vec3(1.0);
     m.diffuse.back = vec3(0.0);
@@ -208,6 +211,7 @@ Underside underside_of(vec3 leaving, vec3 reflected, vec3 through, vec3 absorbed
 Matter base_matter(Slab slab, float cos_view) {
     Matter m = no_matter();
     m.coverage = slab_coverage(slab, cos_view);
+    m.bare = slab_bare(slab, cos_view);
     m.cos_view = cos_view;
     m.alpha2 = square(square(slab.roughness));
     m.ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
@@ -222,6 +226,7 @@ Matter base_matter(Slab slab, float cos_view) {
     vec3 lost = absorbed;
     vec3 scattered = vec3(1.0);
     m.transmittance = vec3(0.0);
+    m.scattered = scattered;
 #ifdef NACRE_SLAB_MEDIUM
     if ((slab.features & slab_medium) != 0u) {
         MediumScattering medium = slab_scattering(slab, mean_cosine);
@@ -233,12 +238,10 @@ Matter base_matter(Slab slab, float cos_view) {
         albedo = min(reflected * leaving * between, vec3(1.0));
         passed = through * between;
         lost = absorbed * between;
+        m.scattered = scattered * (1.0 - max(slab.phase_anisotropy, 0.0));
         m.transmittance =
             exp(log(clamp(through / max(medium.kept, vec3(1e-6)), vec3(1e-30), vec3(1.0))) * mean_cosine);
     }
-#endif
-#ifdef NACRE_SLAB_MEDIUM
-    m.scattered = scattered * (1.0 - max(slab.phase_anisotropy, 0.0));
 #endif
     Fresnel fresnel = slab_fresnel(slab);
     vec3 mean = fresnel_mean(fresnel);
@@ -313,12 +316,13 @@ Bounces bounces_between(Matter top, Matter base) {
 }
 
 // Of what lies below, seen through matter that covers only a part.
-vec3 matter_throughput(Matter m) { return vec3(1.0 - m.coverage) + m.coverage * m.view_transmittance; }
+vec3 matter_throughput(Matter m) { return vec3(m.bare) + m.coverage * m.view_transmittance; }
 
 // Coverage with an amount: less of the same matter.
 Matter cover_matter(Matter m, float amount) {
     Matter covered = m;
     covered.coverage = m.coverage * amount;
+    covered.bare = (1.0 - amount) + m.bare * amount;
     return covered;
 }
 
@@ -338,6 +342,7 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     float covered_b = amount * b.coverage;
     Matter m = no_matter();
     m.coverage = covered_a + covered_b;
+    m.bare = (1.0 - amount) * a.bare + amount * b.bare;
     if (m.coverage <= 0.0) return m;
     float share = covered_b / m.coverage;
     m.transmittance = mix(a.transmittance, b.transmittance, share);
@@ -375,10 +380,11 @@ Underside layer_underside(Underside top, Underside base, Matter base_matter, flo
 // One above the other, lying independently: both on C_t C_b of the surface, either alone on the rest.
 Matter layer_matter(Matter top, Matter base) {
     float both = top.coverage * base.coverage;
-    float only_top = top.coverage * (1.0 - base.coverage);
-    float only_base = (1.0 - top.coverage) * base.coverage;
+    float only_top = top.coverage * base.bare;
+    float only_base = top.bare * base.coverage;
     Matter m = no_matter();
     m.coverage = both + only_top + only_base;
+    m.bare = top.bare * base.bare;
     if (m.coverage <= 0.0) return m;
     float t = only_top / m.coverage;
     float b = only_base / m.coverage;
@@ -417,7 +423,7 @@ Path path_through_mix(Path path, float amount) {
 // A path that comes up from the base of a layer under `top`; `base` is all that lies below the top, to the bottom of
 // the material: light that is thrown back may hit any part of it.
 Path path_through_layer(Path path, Matter top, Matter base) {
-    vec3 beside = vec3(1.0 - top.coverage);
+    vec3 beside = vec3(top.bare);
     Bounces bounces = bounces_between(top, base);
     vec3 through = top.coverage * top.view_transmittance * bounces.leaving;
     vec3 sum = beside + through;
@@ -428,8 +434,9 @@ Path path_through_layer(Path path, Matter top, Matter base) {
     // Scattered on its way to the base or on its way back.
     vec3 sharp = (vec3(1.0) - bounces.spread) * (vec3(1.0) - top.scattered) * (vec3(1.0) - top.scattered);
     above.spread = vec3(1.0) - (vec3(1.0) - path.spread) * mix(sharp, vec3(1.0), by);
-    above.under_interface =
-        1.0 - (1.0 - path.under_interface) * (1.0 - top.under_interface * (1.0 - dot(by, vec3(1.0 / 3.0))));
+    // One number for all channels: by what each lets through, since what another would see does not matter.
+    float covered_share = dot(through, vec3(1.0)) / max(dot(sum, vec3(1.0)), 1e-30);
+    above.under_interface = 1.0 - (1.0 - path.under_interface) * (1.0 - top.under_interface * covered_share);
     above.uncovered = path.uncovered * by;
     // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
     // that stands for both is between.
