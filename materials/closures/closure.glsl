@@ -35,6 +35,7 @@
 //     float slab_coverage(Slab slab, float cos_theta)                 where a slab may have slab_edge_coverage
 //     float slab_bare(Slab slab, float cos_theta)                     the rest of the surface
 //     vec3 internal_transmittance(Slab slab)                          of diffuse light from the medium's side
+//     vec3 internal_reflectance(Slab slab)                            the rest of that
 //
 // Who includes this provides the tables (materials/closures/tables.glsl, medium.glsl) and, where a slab may have
 // slab_specular_lut, vec3 specular_lut(uint index, vec2 at): the tint by the cosines of view and light to the normal.
@@ -198,6 +199,15 @@ vec3 internal_transmittance(Slab slab) {
     vec3 mean = fresnel_mean_transmittance(slab_fresnel(slab));
     vec3 ior = vec3(medium_ior(slab.f0.x), medium_ior(slab.f0.y), medium_ior(slab.f0.z));
     return clamp(mean / (ior * ior), vec3(0.05), vec3(1.0));
+}
+
+// 1 - internal_transmittance, with all digits where the medium is hardly denser.
+vec3 internal_reflectance(Slab slab) {
+    Fresnel fresnel = slab_fresnel(slab);
+    vec3 root = sqrt(clamp(slab.f0, vec3(0.0), vec3(0.2)));
+    vec3 outside = (vec3(1.0) + root) * (vec3(1.0) + root);
+    // 1 - 1 / ior^2 is 4 root / (1 + root)^2.
+    return min(fresnel_mean(fresnel) + fresnel_mean_transmittance(fresnel) * 4.0 * root / outside, vec3(0.95));
 }
 
 #ifdef NACRE_SLAB_MEDIUM

@@ -46,6 +46,10 @@ float tracked_roughness(float roughness, Widening widening) {
 // "Authoring Materials that matter", SIGGRAPH 2023; the formulae are ours. Any subtree counts as one piece of matter
 // whose parts lie independently of each other, so that a slab yields one closure whatever is above it.
 
+// 1 - (1 - a)(1 - b), for what happens here or there, with all digits where both are small.
+float either(float a, float b) { return a + b * (1.0 - a); }
+vec3 either(vec3 a, vec3 b) { return a + b * (vec3(1.0) - a); }
+
 // How much what is seen through a subtree spreads. Known before any closure is, since closures depend on it.
 struct Spread {
     float coverage;
@@ -195,11 +199,11 @@ Path open_path() {
 }
 
 // A medium that lets `through` pass of diffuse light, takes `absorbed` and reflects the rest, `reflected`, under an
-// interface that lets `leaving` out.
-Underside underside_of(vec3 leaving, vec3 reflected, vec3 through, vec3 absorbed) {
+// interface that lets `leaving` out and throws the rest, `inwards`, back.
+Underside underside_of(vec3 leaving, vec3 inwards, vec3 reflected, vec3 through, vec3 absorbed) {
     vec3 kept = through + absorbed;
     vec3 between = vec3(1.0) / max(kept + leaving * reflected, vec3(1e-9));
-    vec3 down = (vec3(1.0) - leaving) * between;
+    vec3 down = inwards * between;
     Underside u;
     u.back = min(reflected + through * through * down, vec3(1.0));
     u.leaving = kept * leaving * between;
@@ -217,6 +221,7 @@ Matter base_matter(Slab slab, float cos_view) {
     m.ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
     m.under_interface = saturated(largest(slab.f0) / smallest_reflectance);
     vec3 leaving = internal_transmittance(slab);
+    vec3 inwards = internal_reflectance(slab);
     // Of the medium, and of the medium under its interface.
     vec3 reflected = slab.albedo;
     vec3 through = vec3(0.0);
@@ -250,13 +255,18 @@ Matter base_matter(Slab slab, float cos_view) {
     m.passed = entering * passed;
     m.absorbed = entering * lost;
     m.gloss = mean / max(m.albedo, vec3(1e-30));
-    m.diffuse = underside_of(leaving, reflected, through, absorbed);
+    m.diffuse = underside_of(leaving, inwards, reflected, through, absorbed);
     // Light that was scattered on its way in is diffuse when it comes back.
-    m.mirrored = mix_underside(underside_of(fresnel_transmittance(fresnel, cos_view), reflected, through, absorbed),
-                               m.diffuse, scattered);
+    m.mirrored =
+        mix_underside(underside_of(fresnel_transmittance(fresnel, cos_view), fresnel_reflectance(fresnel, cos_view),
+                                   reflected, through, absorbed),
+                      m.diffuse, scattered);
     // A fit: 0.124 at index 1.5, for lobes so narrow that they hardly let anything escape that was reflected once.
-    m.trapped =
-        mix_underside(underside_of(exp(log(leaving) * 2.3), reflected, through, absorbed), m.diffuse, scattered);
+    vec3 steps = 2.3 * vec3(minus_log_rest(inwards.x), minus_log_rest(inwards.y), minus_log_rest(inwards.z));
+    m.trapped = mix_underside(
+        underside_of(exp(-steps), vec3(exponential_rest(steps.x), exponential_rest(steps.y), exponential_rest(steps.z)),
+                     reflected, through, absorbed),
+        m.diffuse, scattered);
 #ifdef NACRE_SLAB_FUZZ
     if ((slab.features & slab_fuzz) != 0u) {
         float fuzz = slab.fuzz_amount * sheen_albedo(mean_cosine, slab.fuzz_roughness);
@@ -405,9 +415,8 @@ Matter layer_matter(Matter top, Matter base) {
     vec3 of_base = b * base.albedo + tb * below;
     m.gloss = gloss_of_both(top, of_top, base, of_base);
     m.alpha2 = alpha2_of_both(top, of_top, base, of_base);
-    float only_above = (1.0 - top.under_interface * (t + tb)) * (1.0 - base.under_interface * (b + tb));
-    m.under_interface = 1.0 - only_above;
-    m.scattered = vec3(1.0) - (vec3(1.0) - top.scattered * (t + tb)) * (vec3(1.0) - base.scattered * (b + tb));
+    m.under_interface = either(top.under_interface * (t + tb), base.under_interface * (b + tb));
+    m.scattered = either(top.scattered * (t + tb), base.scattered * (b + tb));
     m.ior = mix(1.0, top.ior, t + tb) * mix(1.0, base.ior, b + tb);
     m.cos_view = base.cos_view;
     return m;
@@ -432,11 +441,11 @@ Path path_through_layer(Path path, Matter top, Matter base) {
     Path above;
     above.weight = path.weight * sum;
     // Scattered on its way to the base or on its way back.
-    vec3 sharp = (vec3(1.0) - bounces.spread) * (vec3(1.0) - top.scattered) * (vec3(1.0) - top.scattered);
-    above.spread = vec3(1.0) - (vec3(1.0) - path.spread) * mix(sharp, vec3(1.0), by);
+    vec3 blurred = either(bounces.spread, either(top.scattered, top.scattered));
+    above.spread = either(path.spread, blurred * through / max(sum, vec3(1e-30)));
     // One number for all channels: by what each lets through, since what another would see does not matter.
     float covered_share = dot(through, vec3(1.0)) / max(dot(sum, vec3(1.0)), 1e-30);
-    above.under_interface = 1.0 - (1.0 - path.under_interface) * (1.0 - top.under_interface * covered_share);
+    above.under_interface = either(path.under_interface, top.under_interface * covered_share);
     above.uncovered = path.uncovered * by;
     // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
     // that stands for both is between.
