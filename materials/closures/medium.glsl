@@ -70,8 +70,11 @@ Scattering medium_scattering(float albedo, float darkness, float depth, float ph
     Scattering result;
     float similarity = medium_similarity(albedo, darkness);
     float dissimilarity = medium_dissimilarity(albedo);
-    float single = dissimilarity * (2.0 - dissimilarity);
-    float inverse = 1.0 / (1.0 - phase_anisotropy * similarity * similarity);
+    // The constants of both fits are rounded: the smaller one counts, so that what is scattered and absorbed makes 1.
+    bool is_bright = similarity < 0.5;
+    float single = is_bright ? 1.0 - similarity * similarity : dissimilarity * (2.0 - dissimilarity);
+    float absorption = is_bright ? similarity * similarity : 1.0 - single;
+    float inverse = 1.0 / (1.0 - phase_anisotropy * absorption);
     float reduced = depth * (1.0 - phase_anisotropy) * inverse;
     float column = sqrt(clamp(cosine, 0.0, 1.0));
     float row = medium_table_row(reduced);
@@ -85,13 +88,12 @@ Scattering medium_scattering(float albedo, float darkness, float depth, float ph
     float back = 1.0 - forth;
     float escaping = hit * single * (1.0 - entry.y);
     float reflected = escaping * back;
-    float absorbed = hit * (similarity * similarity + single * entry.y);
+    float absorbed = hit * (absorption + single * entry.y);
     result.opaque = hit * hit * saturated(2.0 * back - 1.0);
     // An infinitely thick medium reflects its albedo towards every angle, as an opaque one does. The difference is that
     // of the smaller numbers, of what is reflected or of what is not.
     float infinite_albedo = single * (1.0 - infinite.y);
-    float missing = albedo < 0.5 ? albedo - infinite_albedo
-                                 : (similarity * similarity + single * infinite.y) - darkness;
+    float missing = albedo < 0.5 ? albedo - infinite_albedo : absorption + single * infinite.y - darkness;
     // What is added must be there to be had.
     float added = min(reflected * result.opaque * missing / max(infinite_albedo, 1e-30), absorbed);
     result.reflected = reflected + added;

@@ -202,7 +202,7 @@ Path open_path() {
 // interface that lets `leaving` out and throws the rest, `inwards`, back.
 Underside underside_of(vec3 leaving, vec3 inwards, vec3 reflected, vec3 through, vec3 absorbed) {
     vec3 kept = through + absorbed;
-    vec3 between = vec3(1.0) / max(kept + leaving * reflected, vec3(1e-9));
+    vec3 between = vec3(1.0) / max(kept + leaving * reflected, vec3(1e-30));
     vec3 down = inwards * between;
     Underside u;
     u.back = min(reflected + through * through * down, vec3(1.0));
@@ -239,13 +239,13 @@ Matter base_matter(Slab slab, float cos_view) {
         through = medium.through + medium.straight;
         absorbed = medium.absorbed;
         scattered = medium.through / max(through, vec3(1e-30));
-        vec3 between = vec3(1.0) / max(medium.kept + leaving * reflected, vec3(1e-9));
+        vec3 between = vec3(1.0) / max(medium.kept + leaving * reflected, vec3(1e-30));
         albedo = min(reflected * leaving * between, vec3(1.0));
         passed = through * between;
         lost = absorbed * between;
         m.scattered = scattered * (1.0 - max(slab.phase_anisotropy, 0.0));
         m.transmittance =
-            exp(log(clamp(through / max(medium.kept, vec3(1e-6)), vec3(1e-30), vec3(1.0))) * mean_cosine);
+            exp(log(clamp(through / max(medium.kept, vec3(1e-30)), vec3(1e-30), vec3(1.0))) * mean_cosine);
     }
 #endif
     Fresnel fresnel = slab_fresnel(slab);
@@ -376,7 +376,7 @@ Matter mix_matter(Matter a, Matter b, float amount) {
 Underside layer_underside(Underside top, Underside base, Matter base_matter, float t, float b, float tb) {
     // 1 - albedo * back by positive terms.
     vec3 between = vec3(1.0) / max(top.leaving + top.absorbed + top.back * (base_matter.passed + base_matter.absorbed),
-                                   vec3(1e-6));
+                                   vec3(1e-30));
     vec3 back = base.back + base.leaving * base_matter.transmittance * top.back * base_matter.passed * between;
     vec3 taken = base_matter.absorbed + base_matter.passed * (vec3(1.0) - base_matter.transmittance);
     vec3 absorbed = base.absorbed + base.leaving * between * (top.absorbed + top.back * taken);
