@@ -252,9 +252,11 @@ TEST(Closure, WhatMatterKeepsIsTheRest) {
             ASSERT_LT(error, allowed) << what << " of tree " << i;
         }
     };
-    const auto check_matter = [&](const Library::Matter& m, int i) {
+    // Light that would never leave is let out by 1e-9 at each bounce, which thousands of them show.
+    constexpr double bounced = 1e-4;
+    const auto check_matter = [&](const Library::Matter& m, int i, double allowed_from_above) {
         ASSERT_NEAR(m.coverage + m.bare, 1.0, 1e-9) << i;
-        check(m.albedo + m.passed + m.absorbed, "light from above", i);
+        check(m.albedo + m.passed + m.absorbed, "light from above", i, allowed_from_above);
         for (const Library::Underside& u : {m.diffuse, m.mirrored, m.trapped})
             check(u.back + u.leaving + u.absorbed, "light from below", i);
     };
@@ -278,12 +280,12 @@ TEST(Closure, WhatMatterKeepsIsTheRest) {
         const auto a = make(), b = make(), c = make();
         const auto mixed = library.cover_matter(library.mix_matter(a, b, random()), random());
         const auto layered = library.layer_matter(mixed, c);
-        for (const auto& m : {a, b, c, mixed, layered, library.layer_matter(layered, library.layer_matter(b, a))})
-            ASSERT_NO_FATAL_FAILURE(check_matter(m, i));
-        // Light that would never leave is let out by 1e-9 at each bounce, which thousands of them show.
+        for (const auto& m : {a, b, c, mixed}) ASSERT_NO_FATAL_FAILURE(check_matter(m, i, 1e-9));
+        for (const auto& m : {layered, library.layer_matter(layered, library.layer_matter(b, a))})
+            ASSERT_NO_FATAL_FAILURE(check_matter(m, i, bounced));
         const auto bounces = library.bounces_between(mixed, c);
         check(c.albedo * bounces.leaving * mixed.transmittance + c.passed * bounces.arriving + bounces.absorbed,
-              "what bounces", i, 1e-4);
+              "what bounces", i, bounced);
     }
     std::printf("sums are off by at most %.1e\n", worst);
 }
