@@ -56,7 +56,8 @@ inline const std::vector<double>& roughnesses() {
 inline glm::dvec3 integrate(Library& library, const Library::Closure& closure, int strata) {
     Library::Closure none = closure;
     none.diffuse = none.fuzz = none.thin = none.subsurface = none.transmission = glm::dvec3(0.0);
-    none.specular.scale = none.specular.albedo = none.second.scale = none.second.albedo = glm::dvec3(0.0);
+    none.specular = library.scaled_lobe(closure.specular, glm::dvec3(0.0));
+    none.second = library.scaled_lobe(closure.second, glm::dvec3(0.0));
     none.diffuse_probability = none.fuzz_probability = none.specular_probability = none.second_probability = 0.0;
     none.transmission_probability = 0.0;
     std::array<Library::Closure, 5> lobes = {none, none, none, none, none};

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "core/embedded_file.h"
@@ -14,6 +15,8 @@ namespace {
 
 /// The file is part of the program: a fault in it is a bug, found by tests/passes/profiles_test.cpp.
 std::vector<Profile> parse_profiles() {
+    const std::map<std::string, DiffuseModel> diffuse_models = {{"chan", DiffuseModel::chan},
+                                                                {"lambert", DiffuseModel::lambert}};
     std::vector<Profile> result;
     for (const EmbeddedFile& file : embedded_files()) {
         if (file.path != "passes/profiles.json") continue;
@@ -30,6 +33,7 @@ std::vector<Profile> parse_profiles() {
             profile.gbuffer_bytes_per_pixel = row.at("gbuffer_bytes_per_pixel");
             profile.closures_per_pixel = row.at("closures_per_pixel");
             profile.float32_lit_color = row.at("float32_lit_color");
+            profile.diffuse_model = diffuse_models.at(row.at("diffuse_model"));
             profile.lights = row.at("lights");
             profile.shadow_views = row.at("shadow_views");
             profile.shadow_map_size = row.at("shadow_map_size");

@@ -17,6 +17,10 @@
 
 namespace nacre::passes {
 
+/// What the opaque medium of a slab is lit with (NACRE_DIFFUSE_MODEL): Chan's model over its own albedo, which is what
+/// materials mean, or Lambert's, which is cheaper and off by what docs/materials.md says.
+enum class DiffuseModel : std::uint32_t { chan, lambert };
+
 /// One row of passes/profiles.json. Budgets are upper bounds; a scene that needs less gets less.
 struct Profile {
     std::string name;
@@ -29,6 +33,7 @@ struct Profile {
     std::uint32_t gbuffer_bytes_per_pixel = 12;  ///< What the renderer's G-buffer holds today.
     std::uint32_t closures_per_pixel = 1;
     bool float32_lit_color = false;           ///< Lit color with 32 instead of 16 bits per channel.
+    DiffuseModel diffuse_model = DiffuseModel::chan;
     std::uint32_t lights = 64;                ///< Punctual lights; the weakest beyond are left out, with a warning.
     std::uint32_t shadow_views = 16;          ///< Layers of the shadow map: 1 for directional and spot, 6 for point lights.
     std::uint32_t shadow_map_size = 1024;     ///< Texels along one side of a layer.

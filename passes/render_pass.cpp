@@ -190,7 +190,7 @@ std::vector<FrameUse> lighting_uses(const FrameResources& resources) {
     return {{.buffer = resources.camera, .use = ResourceUse::uniform_buffer},
             {.buffer = resources.lights, .use = ResourceUse::uniform_buffer},
             {.buffer = resources.irradiance, .use = ResourceUse::uniform_buffer},
-            {.texture = resources.albedo_table, .use = ResourceUse::sampled},
+            {.texture = resources.interface_table, .use = ResourceUse::sampled},
             {.texture = resources.environment, .use = ResourceUse::sampled},
             {.texture = resources.shadow_maps, .use = ResourceUse::sampled}};
 }
@@ -200,7 +200,8 @@ void uses_lighting(PassDeclaration& pass, const FrameResources& resources) {
 }
 
 std::vector<rhi::ShaderDefine> lighting_defines(const Decisions& decisions) {
-    std::vector<rhi::ShaderDefine> defines = {{"ENVIRONMENT_MIPS", std::to_string(decisions.environment_mips)}};
+    std::vector<rhi::ShaderDefine> defines = {{"ENVIRONMENT_MIPS", std::to_string(decisions.environment_mips)},
+                                              {"NACRE_DIFFUSE_MODEL", std::to_string(std::to_underlying(decisions.diffuse_model))}};
     if (decisions.light_capacity > 0) defines.push_back({"LIGHTS", std::to_string(decisions.light_capacity)});
     if (decisions.shadow_capacity > 0) {
         defines.push_back({"SHADOW_VIEWS", std::to_string(decisions.shadow_capacity)});

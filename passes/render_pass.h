@@ -37,6 +37,7 @@ struct Decisions {
     std::uint32_t shadow_view_count = 0; ///< Layers of the shadow map.
     std::uint32_t shadow_map_size = 0;
     std::uint32_t shadow_filter_width = 1;
+    DiffuseModel diffuse_model = DiffuseModel::chan;
     std::uint32_t environment_size = 0, environment_mips = 1;
     rhi::Format lit_format = rhi::Format::rgba16_float;
     rhi::Format depth_format = rhi::Format::d32_float;
@@ -46,7 +47,7 @@ struct Decisions {
 struct FrameResources {
     TextureId depth, material_0, material_1, top_layer, emission, shadow_maps, lit, tile_classes, final_color;
     BufferId tile_lists, tiles, tile_lists_start, exposure, camera, lights, shadow_cameras, materials, irradiance;
-    TextureId environment, albedo_table;
+    TextureId environment, interface_table;
     TextureId material_slices;                   ///< Words of stored closures beyond the second.
     std::vector<BufferId> geometry;              ///< As SceneGeometry::buffers().
     std::vector<TextureId> material_textures;    ///< As SceneMaterials::textures().

@@ -17,7 +17,6 @@
 #include "passes/lights.h"
 #include "passes/profiles.h"
 #include "passes/render_pass.h"
-#include "passes/tables/ggx_albedo.h"
 
 namespace nacre::passes {
 
@@ -99,7 +98,6 @@ struct Renderer::State {
         for (const rhi::Sampler sampler : {nearest, linear}) {
             if (sampler) device.destroy(sampler);
         }
-        if (albedo_table) device.destroy(albedo_table);
         if (timestamps) device.destroy(timestamps);
     }
 
@@ -126,7 +124,6 @@ struct Renderer::State {
     rhi::Buffer camera{}, lights{}, shadow_cameras{}, exposure{}, tile_lists_start{};
     rhi::BufferDesc exposure_desc;
     rhi::Sampler nearest{}, linear{};
-    rhi::Texture albedo_table{};
     rhi::QueryPool timestamps{};
     rhi::BindGroupLayout camera_layout{}, lighting_layout{};
     rhi::BindGroup camera_group{}, lighting_group{};
@@ -200,7 +197,7 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
         }
         decisions.alpha_test |= draw.alpha_mode == materials::AlphaMode::mask;
         decisions.draws_opaque = true;
-        decisions.emission |= draw.features.emits;
+        decisions.emission |= draw.emits;
         decisions.closures |= draw.has_closures && closures.find(draw.material)->layout.storage_class !=
                                                        materials::StorageClass::simple;
         (draw.features.unlit ? decisions.unlit : decisions.slab) = true;
@@ -243,6 +240,7 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
     decisions.shadow_capacity = list_capacity(light_setup.shadow_views.size());
     decisions.shadow_map_size = light_setup.shadow_map_size;
     decisions.shadow_filter_width = profile->shadow_filter_width;
+    decisions.diffuse_model = profile->diffuse_model;
 
     const auto leave_out = [&](bool needed, const char* what, const char* why) {
         if (!needed) left_out.push_back({what, why});
@@ -294,13 +292,6 @@ Expected<void> Renderer::State::make_shared_objects(const scene::Scene& scene) {
                                              .address_v = rhi::AddressMode::clamp_to_edge,
                                              .address_w = rhi::AddressMode::clamp_to_edge,
                                              .name = "linear"}));
-    const rhi::TextureDesc table_desc{.format = rhi::Format::rg16_float,
-                                      .width = ggx_albedo_size,
-                                      .height = ggx_albedo_size,
-                                      .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::copy_destination,
-                                      .name = "albedo table"};
-    NACRE_TRY(albedo_table, device.create_texture(table_desc));
-    NACRE_CHECK(device.write_texture(albedo_table, std::as_bytes(ggx_albedo_table())));
 
     const auto uniform = rhi::BufferUsage::uniform | rhi::BufferUsage::copy_destination;
     const rhi::BufferDesc camera_desc{.size = sizeof(CameraBlock), .usage = uniform, .name = "camera"};
@@ -348,7 +339,6 @@ Expected<void> Renderer::State::make_shared_objects(const scene::Scene& scene) {
     resources.exposure = graph.import_buffer(exposure, exposure_desc);
     resources.tile_lists_start = graph.import_buffer(tile_lists_start, start_desc, true);
     resources.environment = graph.import_texture(environment->cube(), environment->cube_desc());
-    resources.albedo_table = graph.import_texture(albedo_table, table_desc);
     for (const SceneGeometry::NamedBuffer& buffer : geometry->buffers()) {
         resources.geometry.push_back(graph.import_buffer(buffer.buffer, buffer.desc, true));
     }
@@ -357,6 +347,7 @@ Expected<void> Renderer::State::make_shared_objects(const scene::Scene& scene) {
         NACRE_TRY(const rhi::TextureDesc desc, device.describe(texture));
         resources.material_textures.push_back(graph.import_texture(texture, desc, true));
     }
+    resources.interface_table = resources.material_textures[materials->table_place(0)];
 
     // Set 0: the camera alone, and everything that lighting reads.
     const auto vertex = rhi::ShaderStage::vertex, fragment = rhi::ShaderStage::fragment, compute = rhi::ShaderStage::compute;
@@ -449,7 +440,7 @@ Expected<void> Renderer::State::make_passes() {
     std::vector<rhi::BindGroupEntry> entries = {{.binding = 0, .buffer = camera}};
     if (lights) entries.push_back({.binding = 1, .buffer = lights});
     entries.push_back({.binding = 2, .buffer = environment->irradiance()});
-    entries.push_back({.binding = 3, .texture = albedo_table, .sampler = linear});
+    entries.push_back({.binding = 3, .texture = materials->table(0), .sampler = nearest});
     entries.push_back({.binding = 4, .texture = environment->cube(), .sampler = linear});
     if (decisions.shadow_view_count > 0) {
         entries.push_back({.binding = 5, .texture = graph.texture(resources.shadow_maps), .sampler = nearest});

@@ -84,7 +84,12 @@ class TextWriter {
             "#include \"passes/shared/fragment_inputs.glsl\"\n#include \"materials/closures/table_textures.glsl\"\n"
             "layout(location = 5) in vec3 in_position;\n"
             "float tree_parameter(uint index) {{ return closure_numbers[index >> 2u][index & 3u]; }}\n");
-        if (has(materials::slab_specular_lut)) print("vec3 specular_lut(uint index, vec2 at) {{ return vec3(1.0); }}\n");
+        if (has(materials::slab_specular_lut)) {
+            print(
+                "layout(set = 1, binding = 4) uniform usampler2D specular_texels;\n"
+                "#include \"materials/closures/specular_tables.glsl\"\n");
+        }
+        print("#ifdef HAS_COLORS\n#define NACRE_TREE_VERTEX_COLOR in_color\n#endif\n");
         if (has(materials::slab_glints)) {
             print(
                 "#ifdef HAS_UV0\n#define NACRE_TREE_GLINT_POSITION in_uv0\n#define NACRE_TREE_GLINT_DX dFdx(in_uv0)\n"
@@ -253,6 +258,8 @@ Expected<SceneClosures> SceneClosures::choose(const scene::Scene& scene, const P
             files->base_pass_path = fmt::format("passes/closures/base_pass_{}.frag", material.topology);
             files->blend = wrap("passes/blend/blend.closures.glsl");
             files->blend_path = fmt::format("passes/closures/blend_{}.frag", material.topology);
+            files->emission = wrap("passes/emission/emission.closures.glsl");
+            files->emission_path = fmt::format("passes/closures/emission_{}.frag", material.topology);
             result.texts_.push_back(std::move(files));
         }
         for (std::uint32_t table = 0; table < closure_table_count; ++table) {
@@ -288,6 +295,9 @@ ShadingFeatures SceneClosures::features_of(const ClosureMaterial& material, cons
     const bool needs_uv0 = (material.features & materials::slab_glints) != 0 ||
                            std::ranges::any_of(material.textures, [](const auto& t) { return t.uv_set == 0; });
     const bool needs_uv1 = std::ranges::any_of(material.textures, [](const auto& t) { return t.uv_set == 1; });
+    const bool needs_colors = std::ranges::any_of(material.flat.visible_tree.nodes,
+                                                  [](const materials::Node& node) { return !node.vertex_colored.empty(); });
+    if (needs_colors && !primitive.colors.empty()) features.attributes |= attribute_bit(Attribute::color);
     if (needs_uv0 && !primitive.uv0.empty()) features.attributes |= attribute_bit(Attribute::uv0);
     if (needs_uv1 && !primitive.uv1.empty()) features.attributes |= attribute_bit(Attribute::uv1);
     return features;
@@ -299,6 +309,7 @@ std::vector<EmbeddedFile> SceneClosures::files() const {
         result.push_back({text->topology_path, text->topology});
         result.push_back({text->base_pass_path, text->base_pass});
         result.push_back({text->blend_path, text->blend});
+        result.push_back({text->emission_path, text->emission});
     }
     return result;
 }

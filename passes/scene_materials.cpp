@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fmt/format.h>
 
+#include "materials/specular_table.h"
 #include "materials/tables/anisotropy_table.h"
 #include "materials/tables/interface_table.h"
 #include "materials/tables/medium_table.h"
@@ -94,11 +95,13 @@ Expected<rhi::Sampler> SceneMaterials::sampler_of(const scene::Scene& scene, int
     return samplers_[index];
 }
 
-Expected<void> SceneMaterials::upload_tables(std::uint32_t tables) {
-    if (tables == 0) return {};
+Expected<void> SceneMaterials::upload_tables(const scene::Scene& scene, std::uint32_t tables) {
+    const std::vector<std::uint16_t> tints = materials::specular_table_words(
+        scene.specular_tables.empty() ? materials::default_specular_tables() : scene.specular_tables);
     const std::span<const std::uint16_t> contents[closure_table_count] = {
-        materials::interface_table(), materials::medium_table(), materials::anisotropy_table()};
-    constexpr const char* names[closure_table_count] = {"interface table", "medium table", "anisotropy table"};
+        materials::interface_table(), materials::medium_table(), materials::anisotropy_table(), tints};
+    constexpr const char* names[closure_table_count] = {"interface table", "medium table", "anisotropy table",
+                                                           "specular tables"};
     NACRE_TRY(table_sampler_, device_.create_sampler({.magnify = rhi::Filter::nearest,
                                                       .minify = rhi::Filter::nearest,
                                                       .mip = rhi::Filter::nearest,
@@ -108,12 +111,15 @@ Expected<void> SceneMaterials::upload_tables(std::uint32_t tables) {
                                                       .name = "table"}));
     for (std::uint32_t i = 0; i < closure_table_count; ++i) {
         if ((tables & (1u << i)) == 0) continue;
-        // As materials/closures/table_textures.glsl reads them: two 16-bit words in a texel, 128 texels in a row.
-        constexpr std::uint32_t width = 128;
-        const std::size_t texels = contents[i].size() / 2, rows = (texels + width - 1) / width;
-        std::vector<std::uint32_t> words(width * rows);
+        // As materials/closures/table_textures.glsl reads them: an entry of four 16-bit words in a texel, or two words
+        // in a texel and 128 texels in a row.
+        const bool has_entries = i == 0;
+        const std::uint32_t width = has_entries ? materials::interface_table_columns : 128;
+        const std::size_t texel_words = has_entries ? 4 : 2;
+        const std::size_t texels = contents[i].size() / texel_words, rows = (texels + width - 1) / width;
+        std::vector<std::uint16_t> words(width * rows * texel_words);
         std::memcpy(words.data(), contents[i].data(), contents[i].size_bytes());
-        const rhi::TextureDesc desc{.format = rhi::Format::r32_uint,
+        const rhi::TextureDesc desc{.format = has_entries ? rhi::Format::rg32_uint : rhi::Format::r32_uint,
                                     .width = width,
                                     .height = static_cast<std::uint32_t>(rows),
                                     .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::copy_destination,
@@ -173,6 +179,8 @@ Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& de
     result->texture_masks_.resize(slabs.size());
     result->textures_of_.resize(slabs.size());
     result->closures_.resize(slabs.size());
+    // Plain slabs are lit with the first table.
+    NACRE_CHECK(result->upload_tables(scene, closures.tables() | 1u));
     if (slabs.empty()) return result;
 
     const std::uint64_t alignment = std::max(device.capabilities().uniform_offset_alignment, 16u);
@@ -204,7 +212,6 @@ Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& de
                                                     .name = "materials"}));
     NACRE_CHECK(device.write_buffer(result->block_, std::span<const std::byte>(blocks)));
 
-    NACRE_CHECK(result->upload_tables(closures.tables()));
     for (std::uint32_t i = 0; i < slabs.size(); ++i) {
         if (!used[i]) continue;
         if (const ClosureMaterial* material = closures.find(i)) {

@@ -44,8 +44,8 @@ class SceneMaterials {
     [[nodiscard]] const std::vector<std::uint32_t>& closure_textures_of(std::uint32_t material) const {
         return closures_[material].textures;
     }
-    /// The tables of the closures, by number (closure_table_count), and their places in textures(); those that no material
-    /// reads are not there.
+    /// The tables of the closures, by number (closure_table_count), and their places in textures(); but for the first,
+    /// which is always there, those that no material reads are not.
     [[nodiscard]] rhi::Texture table(std::uint32_t number) const { return tables_[number]; }
     [[nodiscard]] std::uint32_t table_place(std::uint32_t number) const { return table_places_[number]; }
 
@@ -62,7 +62,7 @@ class SceneMaterials {
     Expected<rhi::Texture> upload_image(const scene::Scene& scene, int image, bool with_mips);
     Expected<rhi::Sampler> make_sampler(const scene::Sampler& sampler, float anisotropy);
 
-    Expected<void> upload_tables(std::uint32_t tables);
+    Expected<void> upload_tables(const scene::Scene& scene, std::uint32_t tables);
     Expected<void> add_closures(const scene::Scene& scene, std::uint32_t material, const ClosureMaterial& closures,
                                 std::uint64_t block_offset, float anisotropy);
     Expected<rhi::Sampler> sampler_of(const scene::Scene& scene, int index, float anisotropy);

@@ -50,6 +50,8 @@ class ShaderLibrary {
     [[nodiscard]] rhi::GraphicsPipeline get(rhi::ReloadableGraphicsPipeline pipeline) const;
     [[nodiscard]] rhi::ComputePipeline get(rhi::ReloadableComputePipeline pipeline) const;
 
+    /// SPIR-V of a shader, noted as above.
+    Expected<rhi::ShaderDesc> compile(const std::string& pass, const rhi::ShaderSource& source);
     /// A shader for work that is done once, when the renderer is made; noted as above.
     Expected<rhi::Shader> shader_for_once(const std::string& pass, const rhi::ShaderSource& source);
 
@@ -66,8 +68,6 @@ class ShaderLibrary {
         rhi::ShaderSource source;
         rhi::Shader shader;
     };
-    Expected<rhi::ShaderDesc> compile(const std::string& pass, const rhi::ShaderSource& source);
-
     rhi::Device& device_;
     std::vector<EmbeddedFile> made_;
     rhi::ShaderCompiler compiler_;

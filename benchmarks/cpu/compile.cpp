@@ -2,14 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <map>
 #include <set>
 
 #include "benchmarks/cpu/bench.h"
-#include "passes/gbuffer_layout.h"
 #include "passes/renderer.h"
+#include "passes/shader_library.h"
 #include "rhi/reflection.h"
 #include "scene/load.h"
 
@@ -32,9 +31,7 @@ struct Program {
 Expected<std::vector<Program>> programs_of(rhi::Device& device, const std::string& scene_name) {
     NACRE_TRY(const scene::Scene scene, scene::load_scene(scene_name));
     NACRE_TRY(const auto renderer, passes::Renderer::create(device, scene, {.width = 256, .height = 256}));
-    const std::string gbuffer = passes::gbuffer_glsl();
-    const std::array<EmbeddedFile, 1> generated = {EmbeddedFile{"passes/shared/gbuffer_fields.glsl", gbuffer}};
-    rhi::ShaderCompiler compiler({.embedded = {passes::embedded_files(), generated}});
+    passes::ShaderLibrary library(device, nullptr, {});
     std::vector<Program> programs;
     std::set<std::string> known;
     for (const passes::PlannedPass& pass : renderer->plan().passes) {
@@ -48,7 +45,7 @@ Expected<std::vector<Program>> programs_of(rhi::Device& device, const std::strin
         };
         for (const passes::PlannedShader& shader : pass.shaders) {
             if (!shader.path.ends_with(".frag")) finish();
-            NACRE_TRY(rhi::ShaderDesc desc, compiler.compile({.path = shader.path, .defines = shader.defines}));
+            NACRE_TRY(rhi::ShaderDesc desc, library.compile(pass.name, {.path = shader.path, .defines = shader.defines}));
             NACRE_TRY(rhi::ShaderReflection reflection, rhi::reflect(desc.spirv, desc.stage));
             program.name += (program.name.empty() ? "" : " + ") + shader.path.substr(shader.path.rfind('/') + 1);
             key += fmt::format("{} {:x};", shader.path, shader.spirv_hash);

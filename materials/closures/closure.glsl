@@ -6,6 +6,9 @@
 #include "materials/closures/ggx.glsl"
 #include "materials/closures/slab.glsl"
 #include "materials/closures/tables.glsl"
+#ifdef NACRE_SLAB_EDGE_COVERAGE
+#include "materials/closures/conversions.glsl"
+#endif
 #ifdef NACRE_SLAB_FUZZ
 #include "materials/closures/fuzz.glsl"
 #endif
@@ -26,7 +29,10 @@
 //
 //     Closure prepare_closure(Slab slab, vec3 view, float footprint)
 //         footprint: meters that a pixel (or ray cone) covers on the surface; tells what the medium scatters within it
+//     Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprint)
+//         bare: the interface without a film, where it is not the slab's (slab_fresnel)
 //     ClosureValue evaluate_closure(Closure closure, vec3 light)
+//     ClosureValue evaluate_closure_above(Closure closure, vec3 light)
 //     ClosureSample sample_closure(Closure closure, vec3 random)      random: [0, 1)^3
 //     float closure_pdf(Closure closure, vec3 light)                  solid angle, of sample_closure without mirrors
 //     ClosureAlbedo closure_albedo(Closure closure)                   to the view, under white light from everywhere
@@ -36,6 +42,9 @@
 //     float slab_bare(Slab slab, float cos_theta)                     the rest of the surface
 //     vec3 internal_transmittance(Slab slab)                          of diffuse light from the medium's side
 //     vec3 internal_reflectance(Slab slab)                            the rest of that
+//
+// With NACRE_CLOSURE_COVERED (materials/closures/operators.glsl defines it) closures may be seen through layers:
+//     Closure cover_closure(Closure closure, vec3 spread, float under_interface)
 //
 // Who includes this provides the tables (materials/closures/tables.glsl, medium.glsl) and, where a slab may have
 // slab_specular_lut, vec3 specular_lut(uint index, vec2 at): the tint by the cosines of view and light to the normal.
@@ -64,20 +73,53 @@ struct ClosureAlbedo {
     vec3 transmission;  // scattered through; what passes straight is closure_throughput
 };
 
-// One lobe of the interface, seen from the view.
+#if defined(NACRE_SLAB_F90) || defined(NACRE_SLAB_F82) || defined(NACRE_SLAB_THIN_FILM)
+#define NACRE_CLOSURE_CURVES
+#endif
+
+// One lobe of the interface, seen from the view. What single scattering reflects by the half vector is scaled by the
+// compensation for multiple, the share of the lobe and what fuzz lets through; a mirror, which lights do not meet, has
+// 0.
 struct SpecularLobe {
     vec2 alpha;
+    float area;  // alpha.x alpha.y
     float view_length;
-    vec3 scale;   // on single scattering: compensation for multiple, share of the lobe, what fuzz lets through
-    vec3 albedo;  // scale included
+#ifdef NACRE_CLOSURE_CURVES
+    Fresnel reflectance;
+#else
+    // Schlick's curve. No digits cancel, since no channel is darker along the surface.
+    vec3 reflectance;
+    vec3 rise;
+#endif
+    vec3 albedo;  // scaled alike
     vec3 passed;  // 1 - albedo of the lobe alone, with all its digits
     bool is_mirror;
 };
 
+// A lobe with a part of its light.
+SpecularLobe scaled_lobe(SpecularLobe lobe, vec3 factor) {
+    SpecularLobe scaled = lobe;
+#ifdef NACRE_CLOSURE_CURVES
+    scaled.reflectance = scaled_fresnel(lobe.reflectance, factor);
+#else
+    scaled.reflectance = lobe.reflectance * factor;
+    scaled.rise = lobe.rise * factor;
+#endif
+    scaled.albedo = lobe.albedo * factor;
+    return scaled;
+}
+
+vec3 lobe_reflectance(SpecularLobe lobe, float half_cosine) {
+#ifdef NACRE_CLOSURE_CURVES
+    return fresnel_reflectance(lobe.reflectance, half_cosine);
+#else
+    return lobe.reflectance + lobe.rise * power5(1.0 - half_cosine);
+#endif
+}
+
 struct Closure {
     uint features;
     vec3 view;
-    Fresnel fresnel;
     SpecularLobe specular;
 #ifdef NACRE_SLAB_SECOND_LOBE
     SpecularLobe second;
@@ -106,10 +148,12 @@ struct Closure {
 #ifdef NACRE_SLAB_SPECULAR_LUT
     uint specular_lut;
 #endif
+#ifdef NACRE_CLOSURE_COVERED
     float under_interface;  // share of the diffuse light that comes through a layer's interface; cover_closure
+#endif
     float gloss;            // of the diffuse model
+    ChanView chan;          // over its own albedo, where Chan's is the model
     vec3 diffuse;           // albedo of what leaves where it entered
-    float diffuse_scale;    // one over the albedo of the diffuse lobe as it is
     float specular_probability;
     float diffuse_probability;
 };
@@ -119,30 +163,50 @@ SpecularLobe make_specular_lobe(Fresnel fresnel, vec3 view, float roughness, flo
     SpecularLobe lobe;
     lobe.is_mirror = ggx_is_mirror(roughness);
     lobe.alpha = ggx_alpha(roughness, anisotropy);
+    lobe.area = lobe.alpha.x * lobe.alpha.y;
     lobe.view_length = ggx_stretched_length(view, lobe.alpha);
-    if (lobe.is_mirror) {
-        lobe.scale = vec3(1.0);
-        lobe.albedo = fresnel_reflectance(fresnel, view.z);
-        lobe.passed = fresnel_transmittance(fresnel, view.z);
-        return lobe;
-    }
+    float cosine = min(view.z, 1.0);
 #ifdef NACRE_SLAB_ANISOTROPY
     GgxAlbedo albedo;
     if (lobe.alpha.x == lobe.alpha.y) {
-        albedo = ggx_albedo(min(view.z, 1.0), lobe.alpha.x);
+        albedo = ggx_albedo(cosine, lobe.alpha.x);
     } else {
         albedo = stretched_ggx_albedo(view, lobe.alpha);
     }
 #else
-    GgxAlbedo albedo = ggx_albedo(min(view.z, 1.0), lobe.alpha.x);
+    GgxAlbedo albedo = ggx_albedo(cosine, lobe.alpha.x);
 #endif
-    vec3 mean = fresnel_mean(fresnel);
-    vec3 single = fresnel.normal * (1.0 - albedo.schlick) + fresnel.grazing * albedo.schlick - fresnel.dip * albedo.dip;
-    vec3 not_single = (vec3(1.0) - fresnel.normal) * (1.0 - albedo.schlick) +
-                      (vec3(1.0) - fresnel.grazing) * albedo.schlick + fresnel.dip * albedo.dip;
-    lobe.scale = vec3(1.0) + mean * (albedo.missing / (1.0 - albedo.missing));
-    lobe.albedo = max(single, vec3(0.0)) * (1.0 - albedo.missing) * lobe.scale;
-    lobe.passed = not_single + max(single, vec3(0.0)) * fresnel_mean_transmittance(fresnel) * albedo.missing;
+    float rest = 1.0 - albedo.schlick;
+    if (lobe.is_mirror) {
+        // All that it reflects comes along one direction.
+        albedo.missing = 0.0;
+        albedo.schlick = power5(1.0 - cosine);
+#ifdef NACRE_SLAB_F82
+        albedo.dip = cosine * albedo.schlick * (1.0 - cosine);
+#endif
+        rest = schlick_rest(cosine, 1.0 - cosine);
+    }
+    vec3 single = fresnel.normal * rest + fresnel.grazing * albedo.schlick;
+    vec3 not_single = (vec3(1.0) - fresnel.normal) * rest + (vec3(1.0) - fresnel.grazing) * albedo.schlick;
+#ifdef NACRE_SLAB_F82
+    single = max(single - fresnel.dip * albedo.dip, vec3(0.0));
+    not_single += fresnel.dip * albedo.dip;
+#endif
+    // Of what a facet sends on to others, these do not reflect.
+    vec3 entering = fresnel_mean_transmittance(fresnel);
+    vec3 lost = entering * albedo.missing;
+    lobe.albedo = single * (vec3(1.0) - lost);
+    lobe.passed = not_single + single * lost;
+    // 1 + mean reflectance * missing / (1 - missing).
+    float again = albedo.missing / (1.0 - albedo.missing);
+    vec3 scale = vec3(1.0 + again) - entering * again;
+    if (lobe.is_mirror) scale = vec3(0.0);
+#ifdef NACRE_CLOSURE_CURVES
+    lobe.reflectance = scaled_fresnel(fresnel, scale);
+#else
+    lobe.reflectance = fresnel.normal * scale;
+    lobe.rise = (fresnel.grazing - fresnel.normal) * scale;
+#endif
     return lobe;
 }
 
@@ -162,9 +226,9 @@ vec3 specular_tint(uint index, float view_cosine, float light_cosine) {
 #include "materials/closures/classic.glsl"
 #endif
 
-float diffuse_lobe(Closure closure, vec3 light) {
+float diffuse_lobe(Closure closure, vec3 light, float half_cosine, float normal_half) {
 #if NACRE_DIFFUSE_MODEL == 0
-    return closure.diffuse_scale * chan_diffuse(closure.view, light, closure.gloss);
+    return chan_diffuse_of(closure.chan, light.z, half_cosine, normal_half);
 #elif NACRE_DIFFUSE_MODEL == 1
     return lambert_diffuse(light);
 #else
@@ -177,6 +241,9 @@ const float mean_cosine = 0.6;
 
 // Of the interface without a film.
 Fresnel slab_fresnel(Slab slab) {
+#if !defined(NACRE_SLAB_F90) && !defined(NACRE_SLAB_F82)
+    return make_plain_fresnel(slab.f0);
+#else
     vec3 f90 = vec3(1.0);
     vec3 f82 = vec3(1.0);
 #ifdef NACRE_SLAB_F90
@@ -186,6 +253,7 @@ Fresnel slab_fresnel(Slab slab) {
     if ((slab.features & slab_f82) != 0u) f82 = slab.f82;
 #endif
     return make_fresnel(slab.f0, f90, f82);
+#endif
 }
 
 // Index of refraction of a slab's medium by the reflectance of its interface. What reflects more than diamond does is
@@ -290,7 +358,7 @@ Closure with_probabilities(Closure closure) {
     return result;
 }
 
-Closure prepare_closure(Slab slab, vec3 view, float footprint) {
+Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprint) {
     Closure closure;
     closure.features = slab.features;
     closure.view = vec3(view.x, view.y, max(view.z, smallest_cosine));
@@ -298,14 +366,14 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 #ifdef NACRE_SLAB_ANISOTROPY
     if ((slab.features & slab_anisotropy) != 0u) anisotropy = slab.anisotropy;
 #endif
-    closure.fresnel = slab_fresnel(slab);
+    Fresnel fresnel = bare;
 #ifdef NACRE_SLAB_THIN_FILM
     if ((slab.features & slab_thin_film) != 0u) {
         float typical = ggx_typical_cosine(min(closure.view.z, 1.0), slab.roughness * slab.roughness);
-        closure.fresnel = make_film_fresnel(closure.fresnel, slab.film_thickness, slab.film_ior, typical);
+        fresnel = make_film_fresnel(bare, slab.film_thickness, slab.film_ior, typical);
     }
 #endif
-    closure.specular = make_specular_lobe(closure.fresnel, closure.view, slab.roughness, anisotropy);
+    closure.specular = make_specular_lobe(fresnel, closure.view, slab.roughness, anisotropy);
     vec3 passed = closure.specular.passed;
 #ifdef NACRE_SLAB_GLINTS
     closure.glint_density = slab.glint_density;
@@ -315,11 +383,9 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 #endif
 #ifdef NACRE_SLAB_SECOND_LOBE
     if ((slab.features & slab_second_lobe) != 0u) {
-        closure.second = make_specular_lobe(closure.fresnel, closure.view, slab.second_roughness, anisotropy);
-        closure.specular.scale *= 1.0 - slab.second_weight;
-        closure.specular.albedo *= 1.0 - slab.second_weight;
-        closure.second.scale *= slab.second_weight;
-        closure.second.albedo *= slab.second_weight;
+        closure.second = make_specular_lobe(fresnel, closure.view, slab.second_roughness, anisotropy);
+        closure.specular = scaled_lobe(closure.specular, vec3(1.0 - slab.second_weight));
+        closure.second = scaled_lobe(closure.second, vec3(slab.second_weight));
         passed = mix(closure.specular.passed, closure.second.passed, slab.second_weight);
     }
 #endif
@@ -330,20 +396,18 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
         uncovered = 1.0 - reflected;
         closure.fuzz = reflected * slab.fuzz_color;
         closure.fuzz_map = sheen_map(closure.view, slab.fuzz_roughness);
-        closure.specular.scale *= uncovered;
-        closure.specular.albedo *= uncovered;
+        closure.specular = scaled_lobe(closure.specular, vec3(uncovered));
 #ifdef NACRE_SLAB_SECOND_LOBE
-        closure.second.scale *= uncovered;
-        closure.second.albedo *= uncovered;
+        closure.second = scaled_lobe(closure.second, vec3(uncovered));
 #endif
     }
 #endif
 #if NACRE_DIFFUSE_MODEL == 0
     closure.gloss = chan_gloss(slab.roughness);
-    closure.diffuse_scale = 1.0 / chan_albedo_by_table(min(closure.view.z, 1.0), closure.gloss);
+    closure.chan = chan_view(closure.view.z, closure.gloss,
+                             1.0 / chan_albedo_by_table(min(closure.view.z, 1.0), closure.gloss));
 #else
     closure.gloss = slab.roughness;
-    closure.diffuse_scale = 1.0;
 #endif
     vec3 entering = passed * uncovered;
     closure.diffuse = slab.albedo * entering;
@@ -381,10 +445,17 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
         closure.straight = entering * medium.straight;
     }
 #endif
+#ifdef NACRE_CLOSURE_COVERED
     closure.under_interface = 0.0;
+#endif
     return with_probabilities(closure);
 }
 
+Closure prepare_closure(Slab slab, vec3 view, float footprint) {
+    return prepare_closure_under(slab, slab_fresnel(slab), view, footprint);
+}
+
+#ifdef NACRE_CLOSURE_COVERED
 // A closure that is seen through layers. spread: share of what its specular lobes send that does not come along them,
 // but as diffuse light does, having been scattered or thrown back on its way. under_interface: share of its light that
 // comes through an interface, which lets little in along the surface.
@@ -392,13 +463,11 @@ Closure cover_closure(Closure closure, vec3 spread, float under_interface) {
     Closure covered = closure;
     vec3 sharp = vec3(1.0) - spread;
     vec3 specular = closure.specular.albedo;
-    covered.specular.scale *= sharp;
-    covered.specular.albedo *= sharp;
+    covered.specular = scaled_lobe(closure.specular, sharp);
 #ifdef NACRE_SLAB_SECOND_LOBE
     if ((closure.features & slab_second_lobe) != 0u) {
         specular += closure.second.albedo;
-        covered.second.scale *= sharp;
-        covered.second.albedo *= sharp;
+        covered.second = scaled_lobe(closure.second, sharp);
     }
 #endif
     covered.diffuse += specular * spread;
@@ -418,10 +487,17 @@ float interface_factor(Closure closure, vec3 light) {
 #endif
     return mix(1.0, schlick_rest(min(light.z, 1.0), 1.0 - min(light.z, 1.0)) / (1.0 - mean), closure.under_interface);
 }
+#endif
 
-vec3 specular_lobe_value(SpecularLobe lobe, vec3 view, vec3 light, vec3 h) {
-    if (lobe.is_mirror) return vec3(0.0);
-    return lobe.scale * ggx_value(view, lobe.view_length, light, h, lobe.alpha);
+// Of a light above the surface, by its half vector with the view and the cosine of the two.
+vec3 specular_lobe_value(Closure closure, SpecularLobe lobe, vec3 light, vec3 h, float half_cosine) {
+#ifdef NACRE_SLAB_ANISOTROPY
+    if ((closure.features & slab_anisotropy) != 0u)
+        return lobe_reflectance(lobe, half_cosine) *
+               ggx_value(closure.view, lobe.view_length, light, h, lobe.alpha);
+#endif
+    return lobe_reflectance(lobe, half_cosine) *
+           round_ggx_value(closure.view.z, lobe.view_length, light, h, lobe.area);
 }
 
 float specular_lobe_pdf(SpecularLobe lobe, vec3 view, vec3 light, vec3 h) {
@@ -429,28 +505,27 @@ float specular_lobe_pdf(SpecularLobe lobe, vec3 view, vec3 light, vec3 h) {
     return ggx_pdf(view, lobe.view_length, light, h, lobe.alpha);
 }
 
-ClosureValue evaluate_closure(Closure closure, vec3 light) {
+// The same where the light is known to be above the surface.
+ClosureValue evaluate_closure_above(Closure closure, vec3 light) {
     ClosureValue value;
-    value.specular = vec3(0.0);
-    value.diffuse = vec3(0.0);
     value.subsurface = vec3(0.0);
-#ifdef NACRE_SLAB_MEDIUM
-    if (light.z < 0.0 && (closure.features & slab_medium) != 0u) value.diffuse = closure.transmission * (-light.z / pi);
-#endif
-    if (light.z <= 0.0) return value;
-    vec3 h = half_vector(closure.view, light);
-    vec3 lobes = specular_lobe_value(closure.specular, closure.view, light, h);
+    // Both are above the surface: their sum has a length. Half of it is the cosine to their half vector.
+    vec3 sum = closure.view + light;
+    float length_squared = dot(sum, sum);
+    float inverse_length = inversesqrt(length_squared);
+    vec3 h = sum * inverse_length;
+    float half_cosine = 0.5 * length_squared * inverse_length;
+    value.specular = specular_lobe_value(closure, closure.specular, light, h, half_cosine);
 #ifdef NACRE_SLAB_GLINTS
     // The second lobe stays smooth: it is the haze around the facets.
     if ((closure.features & slab_glints) != 0u && !closure.specular.is_mirror)
-        lobes *= glint_factor(h, closure.specular.alpha, closure.glint_density, closure.glint_position,
-                              closure.glint_dx, closure.glint_dy);
+        value.specular *= glint_factor(h, closure.specular.alpha, closure.glint_density, closure.glint_position,
+                                       closure.glint_dx, closure.glint_dy);
 #endif
 #ifdef NACRE_SLAB_SECOND_LOBE
     if ((closure.features & slab_second_lobe) != 0u)
-        lobes += specular_lobe_value(closure.second, closure.view, light, h);
+        value.specular += specular_lobe_value(closure, closure.second, light, h, half_cosine);
 #endif
-    value.specular = lobes * fresnel_reflectance(closure.fresnel, half_vector_cosine(closure.view, light));
 #ifdef NACRE_SLAB_SPECULAR_LUT
     if ((closure.features & slab_specular_lut) != 0u)
         value.specular *= specular_tint(closure.specular_lut, closure.view.z, light.z);
@@ -458,25 +533,41 @@ ClosureValue evaluate_closure(Closure closure, vec3 light) {
 #ifdef NACRE_SLAB_FUZZ
     if ((closure.features & slab_fuzz) != 0u) value.specular += closure.fuzz * sheen_density(closure.fuzz_map, light);
 #endif
-    value.diffuse = closure.diffuse * diffuse_lobe(closure, light);
+    value.diffuse = closure.diffuse * diffuse_lobe(closure, light, half_cosine, h.z);
 #ifdef NACRE_SLAB_MEDIUM
     if ((closure.features & slab_medium) != 0u) {
-        value.diffuse += closure.thin * (light.z / pi);
-        value.subsurface = closure.subsurface * (light.z / pi);
+        value.diffuse += closure.thin * (light.z * inverse_pi);
+        value.subsurface = closure.subsurface * (light.z * inverse_pi);
     }
 #endif
+#ifdef NACRE_CLOSURE_COVERED
     if (closure.under_interface > 0.0) {
         float factor = interface_factor(closure, light);
         value.diffuse *= factor;
         value.subsurface *= factor;
     }
+#endif
+    return value;
+}
+
+// One way out: a function that returns early costs more where lanes part.
+ClosureValue evaluate_closure(Closure closure, vec3 light) {
+    ClosureValue value;
+    value.specular = vec3(0.0);
+    value.diffuse = vec3(0.0);
+    value.subsurface = vec3(0.0);
+#ifdef NACRE_SLAB_MEDIUM
+    if (light.z < 0.0 && (closure.features & slab_medium) != 0u)
+        value.diffuse = closure.transmission * (-light.z * inverse_pi);
+#endif
+    if (light.z > 0.0) value = evaluate_closure_above(closure, light);
     return value;
 }
 
 float closure_pdf(Closure closure, vec3 light) {
 #ifdef NACRE_SLAB_MEDIUM
     if (light.z < 0.0 && (closure.features & slab_medium) != 0u)
-        return closure.transmission_probability * (-light.z / pi);
+        return closure.transmission_probability * (-light.z * inverse_pi);
 #endif
     if (light.z <= 0.0) return 0.0;
     vec3 h = half_vector(closure.view, light);
@@ -488,7 +579,7 @@ float closure_pdf(Closure closure, vec3 light) {
 #ifdef NACRE_SLAB_FUZZ
     if ((closure.features & slab_fuzz) != 0u) pdf += closure.fuzz_probability * sheen_density(closure.fuzz_map, light);
 #endif
-    return pdf + closure.diffuse_probability * light.z / pi;
+    return pdf + closure.diffuse_probability * light.z * inverse_pi;
 }
 
 ClosureSample sample_specular_lobe(SpecularLobe lobe, vec3 view, float probability, float random_x, float random_y) {
@@ -595,27 +686,18 @@ vec3 closure_throughput(Closure closure) {
 }
 
 #ifdef NACRE_SLAB_EDGE_COVERAGE
-// By how much a slab is as seen along the normal, and as along the surface: (1 - c)^exponent, which may be small near the
-// normal, and what is left of 1, which is near the surface. Both make 1: a coverage above 1 would leave less than nothing
-// beside it.
-vec2 coverage_shares(Slab slab, float cos_theta) {
-    float steps = slab.edge_exponent * minus_log_rest(saturated(cos_theta));
-    float rest = exponential_rest(steps);
-    return vec2(rest, steps < 0.01 ? 1.0 - rest : exp(-steps));
-}
-
 // Coverage of a slab seen from a cosine to its normal.
 float slab_coverage(Slab slab, float cos_theta) {
     if ((slab.features & slab_edge_coverage) == 0u) return slab.coverage;
-    vec2 shares = coverage_shares(slab, cos_theta);
-    return min(slab.coverage * shares.x + slab.edge_coverage * shares.y, 1.0);
+    return view_dependent_coverage(slab.coverage, slab.edge_coverage, slab.edge_exponent, cos_theta);
 }
 
 // 1 - slab_coverage, with all digits where that is near 1.
 float slab_bare(Slab slab, float cos_theta) {
     if ((slab.features & slab_edge_coverage) == 0u) return max(1.0 - slab.coverage, 0.0);
-    vec2 shares = coverage_shares(slab, cos_theta);
-    return max((1.0 - slab.coverage) * shares.x + (1.0 - slab.edge_coverage) * shares.y, 0.0);
+    return max((1.0 - slab.coverage) * facing_share(cos_theta, slab.edge_exponent) +
+                   (1.0 - slab.edge_coverage) * grazing_share(cos_theta, slab.edge_exponent),
+               0.0);
 }
 #endif
 

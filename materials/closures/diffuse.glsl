@@ -5,7 +5,7 @@
 
 // Light that a medium of albedo 1 scatters back where it entered: value times the cosine of light.
 
-float lambert_diffuse(vec3 light) { return max(light.z, 0.0) / pi; }
+float lambert_diffuse(vec3 light) { return max(light.z, 0.0) * inverse_pi; }
 
 // Retro-reflective diffuse under a rough interface. Source: Chan 2018, "Material advances in Call of Duty: WWII".
 // `gloss` is that game's, 2^(18 gloss) = 2 / alpha^2 - 1: the logarithm in the published .18455 log(...) is that of
@@ -14,7 +14,7 @@ float lambert_diffuse(vec3 light) { return max(light.z, 0.0) / pi; }
 // retro-reflection turns negative (gloss above 0.71) it is 0 here.
 float chan_gloss(float roughness) {
     float alpha = roughness * roughness;
-    return saturated(log2(2.0 / max(alpha * alpha, 1e-7) - 1.0) / 18.0);
+    return saturated(log2(2.0 / max(alpha * alpha, 1e-7) - 1.0) * (1.0 / 18.0));
 }
 
 float chan_glossiness(float gloss) { return saturated(2.2 * gloss - 0.5); }
@@ -22,21 +22,48 @@ float chan_retro_amplitude(float gloss) { return max((34.5 * gloss - 59.0) * glo
 
 // Exponent of the retro-reflection: 8.9 for all rough surfaces, 30.8 where it ends.
 float chan_sharpness(float gloss) { return max(73.2 * gloss - 21.2, 8.9); }
-float chan_sharpness_coordinate(float sharpness) { return saturated((sharpness - 8.9) / 21.9); }
+// In the table, which ends at 1.
+float chan_sharpness_coordinate(float sharpness) { return (sharpness - 8.9) * (1.0 / 21.9); }
 float chan_sharpness_at(float coordinate) { return 8.9 + 21.9 * coordinate; }
 
+// half_cosine and normal_half: the cosines of the half vector of two directions above the surface to these and to the
+// normal.
 float chan_retro(float half_cosine, float normal_half, float sharpness) {
-    return half_cosine * exp2(-sharpness * sqrt(max(normal_half, 0.0)));
+    return half_cosine * exp2(-sharpness * sqrt(normal_half));
+}
+
+// The model seen from one direction: what is the same for all lights.
+struct ChanView {
+    float rough;  // factors of its three parts
+    float glossy;
+    float retro;
+    float sharpness;
+};
+
+// What the model reflects is multiplied by `scale`.
+ChanView chan_view(float view_cosine, float gloss, float scale) {
+    float glossiness = chan_glossiness(gloss);
+    ChanView chan;
+    chan.rough = (1.0 - glossiness) * (scale * inverse_pi);
+    chan.glossy = glossiness * (1.0 - 0.75 * power5(1.0 - min(view_cosine, 1.0))) * (scale * inverse_pi);
+    chan.retro = chan_retro_amplitude(gloss) * (scale * inverse_pi);
+    chan.sharpness = chan_sharpness(gloss);
+    return chan;
+}
+
+// For a light above the surface; half_cosine and normal_half as in chan_retro. A cosine that rounding made larger
+// than 1 does no harm.
+float chan_diffuse_of(ChanView chan, float light_cosine, float half_cosine, float normal_half) {
+    float rough = half_cosine + power5(1.0 - half_cosine);
+    float glossy = 1.0 - 0.75 * power5(1.0 - light_cosine);
+    float retro = chan_retro(half_cosine, normal_half, chan.sharpness);
+    return (chan.rough * rough + chan.glossy * glossy + chan.retro * retro) * light_cosine;
 }
 
 float chan_diffuse(vec3 view, vec3 light, float gloss) {
     if (light.z <= 0.0) return 0.0;
-    float half_cosine = half_vector_cosine(view, light);
-    float rough = half_cosine + power5(1.0 - half_cosine);
-    float glossy = (1.0 - 0.75 * power5(1.0 - min(light.z, 1.0))) * (1.0 - 0.75 * power5(1.0 - min(view.z, 1.0)));
-    float retro =
-        chan_retro_amplitude(gloss) * chan_retro(half_cosine, half_vector(view, light).z, chan_sharpness(gloss));
-    return (mix(rough, glossy, chan_glossiness(gloss)) + retro) * light.z / pi;
+    return chan_diffuse_of(chan_view(view.z, gloss, 1.0), light.z, half_vector_cosine(view, light),
+                           half_vector(view, light).z);
 }
 
 // What chan_diffuse reflects in all: retro_albedo is that of chan_retro. The glossy part is a closed form, the rough

@@ -20,7 +20,7 @@ Fresnel make_fresnel(vec3 f0, vec3 f90, vec3 f82) {
     fresnel.normal = f0;
     float brightest = largest(f90);
     vec3 tint = brightest > 0.0 ? f90 / brightest : vec3(1.0);
-    fresnel.grazing = tint * saturated(largest(f0) / smallest_reflectance);
+    fresnel.grazing = tint * saturated(largest(f0) * (1.0 / smallest_reflectance));
     vec3 rise = fresnel.grazing - f0;
     // (6/7)^5 and 1 / ((1/7) (6/7)^6): the two terms where the dip is largest, at c = 1/7. The bound keeps the sum from
     // falling below 0 anywhere: 1 / (c (1 - c)^6) is at least 17.65, 1 / (c (1 - c)) at least 4. A hundredth is always
@@ -29,6 +29,23 @@ Fresnel make_fresnel(vec3 f0, vec3 f90, vec3 f82) {
                       0.99 * (min(f0, fresnel.grazing) + abs(rise) * 0.226611)) *
                   17.6513846;
     return fresnel;
+}
+
+// That of white F90 and without a dip.
+Fresnel make_plain_fresnel(vec3 f0) {
+    Fresnel fresnel;
+    fresnel.normal = f0;
+    fresnel.grazing = vec3(saturated(largest(f0) * (1.0 / smallest_reflectance)));
+    fresnel.dip = vec3(0.0);
+    return fresnel;
+}
+
+Fresnel scaled_fresnel(Fresnel fresnel, vec3 factor) {
+    Fresnel scaled;
+    scaled.normal = fresnel.normal * factor;
+    scaled.grazing = fresnel.grazing * factor;
+    scaled.dip = fresnel.dip * factor;
+    return scaled;
 }
 
 vec3 fresnel_reflectance(Fresnel fresnel, float cos_theta) {
@@ -49,12 +66,14 @@ vec3 fresnel_transmittance(Fresnel fresnel, float cos_theta) {
 
 // Mean over a hemisphere under diffuse light: integral of 2 c F(c).
 vec3 fresnel_mean(Fresnel fresnel) {
-    return max(fresnel.normal + (fresnel.grazing - fresnel.normal) / 21.0 - fresnel.dip / 126.0, vec3(0.0));
+    return max(fresnel.normal + (fresnel.grazing - fresnel.normal) * (1.0 / 21.0) - fresnel.dip * (1.0 / 126.0),
+               vec3(0.0));
 }
 
 // 1 - fresnel_mean.
 vec3 fresnel_mean_transmittance(Fresnel fresnel) {
-    return (vec3(1.0) - fresnel.normal) * (20.0 / 21.0) + (vec3(1.0) - fresnel.grazing) / 21.0 + fresnel.dip / 126.0;
+    return (vec3(1.0) - fresnel.normal) * (20.0 / 21.0) + (vec3(1.0) - fresnel.grazing) * (1.0 / 21.0) +
+           fresnel.dip * (1.0 / 126.0);
 }
 
 // Index of refraction of a dielectric by its reflectance at normal incidence, and back. An index above 199 (reflectance

@@ -42,6 +42,15 @@ float ggx_value(vec3 view, float view_length, vec3 light, vec3 h, vec2 alpha) {
     return ggx_distribution(h, alpha) * shadowing;
 }
 
+// The same for a lobe that is not stretched and a light above the surface, with one division for all; area: alpha^2.
+// Neither product leaves the range of 32 bits: the denominator is at least smallest_alpha^5 smallest_cosine.
+float round_ggx_value(float view_cosine, float view_length, vec3 light, vec3 h, float area) {
+    float light_length = sqrt(area * (light.x * light.x + light.y * light.y) + light.z * light.z);
+    float stretched = h.x * h.x + h.y * h.y + area * (h.z * h.z);
+    return (0.5 * inverse_pi) * area * light.z /
+           (stretched * stretched * (light.z * view_length + view_cosine * light_length));
+}
+
 // Density of light directions that ggx_sample makes. Below 1 in total: the rest goes below the surface.
 float ggx_pdf(vec3 view, float view_length, vec3 light, vec3 h, vec2 alpha) {
     if (light.z <= 0.0) return 0.0;

@@ -43,9 +43,9 @@ struct Library : Lobes {
 #define NACRE_SLAB_EDGE_COVERAGE 1
 #define float double
 #define const static constexpr
-#include "materials/closures/closure.glsl"
 #include "materials/closures/operators.glsl"
 #include "materials/closures/blending.glsl"
+#include "materials/closures/stored_frame.glsl"
 #undef const
 #undef float
 #undef NACRE_SLAB_ANISOTROPY
@@ -59,6 +59,8 @@ struct Library : Lobes {
 #undef NACRE_SLAB_MEDIUM
 #undef NACRE_SLAB_EMISSION
 #undef NACRE_SLAB_EDGE_COVERAGE
+#undef NACRE_CLOSURE_COVERED
+#undef NACRE_CLOSURE_CURVES
 
     /// The slab as the closures take it.
     [[nodiscard]] static Slab slab_of(const materials::Slab& slab);

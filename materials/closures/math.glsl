@@ -5,6 +5,7 @@
 // no swizzles beyond .x .y .z .w, no out parameters, no constructors of structs and arrays, no textures.
 
 const float pi = 3.14159265358979323846;
+const float inverse_pi = 0.31830988618379067154;
 
 // Views nearer to the surface than this are moved here.
 const float smallest_cosine = 1e-8;

@@ -1,55 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef NACRE_CLOSURES_MEDIUM
 #define NACRE_CLOSURES_MEDIUM
-#include "materials/closures/math.glsl"
+#include "materials/closures/medium_inputs.glsl"
 // A layer of a scattering and absorbing medium between two planes, from opaque to empty. Who includes this has defined
 //
 //     vec2 medium_table(vec3 at)    materials/tables/medium_table.h, interpolated as those of tables.glsl
-
-// Lengths that are divided stay between these: meters.
-const float shortest_length = 1e-12;
-const float longest_length = 1e12;
-
-// The similarity parameter sqrt((1 - w) / (1 - w g)), w being the albedo of a single scattering and g the phase
-// anisotropy, of a medium that reflects `albedo` if it is infinitely thick, and back. 0: nothing is absorbed, 1:
-// nothing is scattered. Source: van de Hulst 1980, in the form of Kulla and Conty 2017; round trip within 2e-5.
-// darkness: 1 - albedo, which has more digits than the albedo where both follow from something else.
-float medium_similarity(float albedo, float darkness) {
-    float root = sqrt(9.59217 + albedo * (41.6808 + albedo * 17.7126));
-    // 4.09712 + 4.20863 albedo - root, multiplied out so that the ends are exact and no digits cancel.
-    return clamp(7.19424 * darkness / (4.09712 + 4.20863 * albedo + root), 0.0, 1.0);
-}
-
-// 1 - medium_similarity, with all digits where that is near 1: the same fit multiplied out from the other end.
-float medium_dissimilarity(float albedo) {
-    float root = sqrt(9.59217 + albedo * (41.6808 + albedo * 17.7126));
-    float rise = (41.6808 + 17.7126 * albedo) / (root + 3.0971232);
-    return clamp(albedo * (rise + 11.40287) / (4.09712 + 4.20863 * albedo + root), 0.0, 1.0);
-}
-
-float medium_albedo(float similarity) {
-    return (1.0 - similarity) * (1.0 - 0.139 * similarity) / (1.0 + 1.17 * similarity);
-}
-
-// Albedo of a single scattering, by 1 - similarity: so a small one has its digits.
-float scattering_albedo(float dissimilarity, float phase_anisotropy) {
-    float single = dissimilarity * (2.0 - dissimilarity);
-    return single / (1.0 - phase_anisotropy * (1.0 - single));
-}
-
-// Mean free path in a medium that lets `transmittance` through `distance`, both in any range; and back.
-float transmittance_to_mean_free_path(float transmittance, float distance) {
-    float depth = -log(clamp(transmittance, 1e-30, 1.0));
-    return clamp(distance / max(depth, 1e-24), 0.0, longest_length);
-}
-
-float optical_depth(float mean_free_path, float distance) {
-    return clamp(distance, 0.0, longest_length) / clamp(mean_free_path, shortest_length, longest_length);
-}
-
-float medium_transmittance(float mean_free_path, float distance) {
-    return exp(-optical_depth(mean_free_path, distance));
-}
 
 // What becomes of light that enters the layer.
 struct Scattering {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef NACRE_CLOSURES_OPERATORS
 #define NACRE_CLOSURES_OPERATORS
+#ifndef NACRE_CLOSURE_COVERED
+#define NACRE_CLOSURE_COVERED
+#endif
 #include "materials/closures/closure.glsl"
 
 // Variance of slopes against roughness (Belcour 2018, "Efficient Rendering of Layered Materials using an Atomic

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 460
 // A mip of the environment cube from an equirectangular picture with mips.
+#include "materials/closures/math.glsl"
 #include "passes/shared/cube.glsl"
-#include "passes/shared/ggx.glsl"
 #include "passes/shared/half.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;

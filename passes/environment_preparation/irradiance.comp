@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 460
 // Nine spherical-harmonic coefficients of the irradiance from a small mip of the environment cube, by one workgroup.
+#include "materials/closures/math.glsl"
 #include "passes/shared/cube.glsl"
-#include "passes/shared/ggx.glsl"
 #include "passes/shared/spherical_harmonics.glsl"
 
 layout(local_size_x = 64) in;

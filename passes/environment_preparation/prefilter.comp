@@ -3,8 +3,8 @@
 // One mip of the environment as rough surfaces mirror it: the GGX lobe around a direction, seen along it.
 // Samples are few because each reads the mip whose texels cover what the sample stands for.
 // Sources: Karis 2013, "Real shading in Unreal Engine 4"; Krivanek and Colbert 2008 for the mips.
+#include "materials/closures/math.glsl"
 #include "passes/shared/cube.glsl"
-#include "passes/shared/ggx.glsl"
 #include "passes/shared/half.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;

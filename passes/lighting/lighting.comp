@@ -8,11 +8,7 @@
 #include "passes/shared/half.glsl"
 #include "passes/shared/shared_exponent.glsl"
 #include "passes/tile_classification/tiles.glsl"
-#ifdef SLAB
-#include "passes/shared/lighting.glsl"
-#endif
 #ifdef CLOSURES
-layout(set = 1, binding = 8) uniform usampler2D interface_texels;
 #ifdef NACRE_SLAB_MEDIUM
 layout(set = 1, binding = 9) uniform usampler2D medium_texels;
 #endif
@@ -20,11 +16,12 @@ layout(set = 1, binding = 9) uniform usampler2D medium_texels;
 layout(set = 1, binding = 10) uniform usampler2D anisotropy_texels;
 #endif
 #ifdef NACRE_SLAB_SPECULAR_LUT
-vec3 specular_lut(uint index, vec2 at) { return vec3(1.0); }
+layout(set = 1, binding = 11) uniform usampler2D specular_texels;
+#include "materials/closures/specular_tables.glsl"
 #endif
-#include "materials/closures/table_textures.glsl"
-#include "materials/closures/operators.glsl"
 #include "passes/shared/closure_lighting.glsl"
+#elif defined(SLAB)
+#include "passes/shared/lighting.glsl"
 #endif
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -43,10 +40,10 @@ layout(set = 1, binding = 7) uniform usampler2D emission;
 #ifdef CLOSURES
 #ifdef MATERIAL_SLICES
 #if MATERIAL_SLICES > 1
-layout(set = 1, binding = 11) uniform usampler2DArray material_slices;
+layout(set = 1, binding = 12) uniform usampler2DArray material_slices;
 #define fetch_slice(pixel, slice) texelFetch(material_slices, ivec3(pixel, slice), 0).r
 #else
-layout(set = 1, binding = 11) uniform usampler2D material_slices;
+layout(set = 1, binding = 12) uniform usampler2D material_slices;
 #define fetch_slice(pixel, slice) texelFetch(material_slices, pixel, 0).r
 #endif
 #endif

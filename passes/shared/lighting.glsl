@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef NACRE_LIGHTING
 #define NACRE_LIGHTING
-// Light that leaves a slab towards the viewer: punctual lights with shadows, and the environment. Set 0, bindings 1 to 5;
-// the camera is binding 0. The same code serves the tiled lighting and the blend pass.
+// Light that leaves a plain slab or a closure towards the viewer: punctual lights with shadows, and the environment. Set 0,
+// bindings 1 to 5; the camera is binding 0. The same code serves the tiled lighting and the blend pass. Who includes this
+// where slabs have features has declared the textures of materials/closures/table_textures.glsl but for the first, or has
+// included it.
 //
 // LIGHTS: number of entries in the light list; undefined: no lights. SHADOW_VIEWS: number of shadow views; undefined: no
 // shadows. SHADOW_LAYERS: there are several, and the map has layers. SHADOW_FILTER_WIDTH: 1, 3 or 5.
 #include "passes/shared/camera.glsl"
-#include "passes/shared/ggx.glsl"
 #include "passes/shared/single_slab.glsl"
 #include "passes/shared/spherical_harmonics.glsl"
+#ifndef NACRE_CLOSURES_TABLE_TEXTURES
+layout(set = 0, binding = 3) uniform usampler2D interface_texels;
+#include "materials/closures/table_textures.glsl"
+#endif
+#include "materials/closures/closure.glsl"
+#include "materials/closures/stored_frame.glsl"
 
 #ifdef LIGHTS
 struct Light {
@@ -30,7 +37,6 @@ layout(set = 0, binding = 1, std140) uniform LightBlock {
 layout(set = 0, binding = 2, std140) uniform IrradianceBlock {
     vec4 irradiance_coefficients[9];
 };
-layout(set = 0, binding = 3) uniform sampler2D albedo_table;
 layout(set = 0, binding = 4) uniform samplerCube environment;
 #ifdef SHADOW_VIEWS
 #ifdef SHADOW_LAYERS
@@ -43,25 +49,14 @@ layout(set = 0, binding = 5) uniform sampler2D shadow_maps;
 
 int cube_face(vec3 direction) {
     vec3 size = abs(direction);
-    if (size.x >= size.y && size.x >= size.z) return direction.x >= 0.0 ? 0 : 1;
-    if (size.y >= size.z) return direction.y >= 0.0 ? 2 : 3;
-    return direction.z >= 0.0 ? 4 : 5;
+    int x_face = direction.x >= 0.0 ? 0 : 1;
+    int y_face = direction.y >= 0.0 ? 2 : 3;
+    int z_face = direction.z >= 0.0 ? 4 : 5;
+    return size.x >= size.y && size.x >= size.z ? x_face : (size.y >= size.z ? y_face : z_face);
 }
 
-// Share of a light that arrives. Percentage-closer filtering with explicit fetches and weights, so that the result does not
-// depend on a device's filter: SHADOW_FILTER_WIDTH^2 bilinear taps, which is a separable kernel over one texel more.
-float shadow(Light light, vec3 position, vec3 normal, vec3 to_light, float distance_to_light) {
-    if (light.direction.w < 0.0) return 1.0;
-    int view = int(light.direction.w);
-    if (light.cone.w != 0.0) view += cube_face(position - light.position.xyz);
-    // The receiver moves off its surface by what a texel of the map covers there.
-    float texel = light.cone.z * (light.color.w == 0.0 ? 1.0 : distance_to_light);
-    float slope = 1.0 - clamp(dot(normal, to_light), 0.0, 1.0);
-    vec3 receiver = position + normal * (texel * (0.6 + 1.4 * slope) * float(SHADOW_FILTER_WIDTH + 1) * 0.5) + to_light * texel;
-    vec4 clip = shadow_views[view] * vec4(receiver, 1.0);
-    if (clip.w <= 0.0) return 1.0;
-    vec3 ndc = clip.xyz / clip.w;
-    if (ndc.z <= 0.0 || ndc.z >= 1.0) return 1.0;
+// Of a place in the shadow map of a view.
+float filtered_shadow(vec3 ndc, int view) {
     ivec2 size = textureSize(shadow_maps, 0).xy;
     vec2 texel_position = (ndc.xy * 0.5 + 0.5) * vec2(size) - 0.5 * float(SHADOW_FILTER_WIDTH);
     vec2 corner = floor(texel_position);
@@ -78,6 +73,25 @@ float shadow(Light light, vec3 position, vec3 normal, vec3 to_light, float dista
     }
     return lit / float(SHADOW_FILTER_WIDTH * SHADOW_FILTER_WIDTH);
 }
+
+// Share of a light that arrives. Percentage-closer filtering with explicit fetches and weights, so that the result does not
+// depend on a device's filter: SHADOW_FILTER_WIDTH^2 bilinear taps, which is a separable kernel over one texel more.
+// Functions here have one way out: what returns early costs more where lanes part.
+float shadow(Light light, vec3 position, vec3 normal, vec3 to_light, float distance_to_light) {
+    float lit = 1.0;
+    if (light.direction.w >= 0.0) {
+        int view = int(light.direction.w);
+        if (light.cone.w != 0.0) view += cube_face(position - light.position.xyz);
+        // The receiver moves off its surface by what a texel of the map covers there.
+        float texel = light.cone.z * (light.color.w == 0.0 ? 1.0 : distance_to_light);
+        float slope = 1.0 - clamp(dot(normal, to_light), 0.0, 1.0);
+        vec3 receiver = position + normal * (texel * (0.6 + 1.4 * slope) * float(SHADOW_FILTER_WIDTH + 1) * 0.5) + to_light * texel;
+        vec4 clip = shadow_views[view] * vec4(receiver, 1.0);
+        vec3 ndc = clip.xyz / (clip.w > 0.0 ? clip.w : 1.0);
+        if (clip.w > 0.0 && ndc.z > 0.0 && ndc.z < 1.0) lit = filtered_shadow(ndc, view);
+    }
+    return lit;
+}
 #endif
 
 // Punctual lights are infinitely small: below this roughness their highlights are smaller than a pixel.
@@ -92,11 +106,12 @@ vec3 incident_light(Light light, vec3 position, out vec3 to_light, out float dis
     if (light.color.w != 0.0) {
         vec3 offset = light.position.xyz - position;
         float distance_squared = max(dot(offset, offset), 1e-8);
-        distance_to_light = sqrt(distance_squared);
-        to_light = offset / distance_to_light;
+        float inverse_distance = inversesqrt(distance_squared);
+        distance_to_light = distance_squared * inverse_distance;
+        to_light = offset * inverse_distance;
         // Window of KHR_lights_punctual.
         float in_range = distance_squared * light.position.w;
-        incident *= clamp(1.0 - in_range * in_range, 0.0, 1.0) / distance_squared;
+        incident *= clamp(1.0 - in_range * in_range, 0.0, 1.0) * (inverse_distance * inverse_distance);
         if (light.color.w == 2.0) {
             float cone = clamp(dot(light.direction.xyz, -to_light) * light.cone.x + light.cone.y, 0.0, 1.0);
             incident *= cone * cone;
@@ -106,42 +121,93 @@ vec3 incident_light(Light light, vec3 position, out vec3 to_light, out float dis
 }
 #endif
 
-vec3 shade_slab(SingleSlab slab, vec3 position, vec3 to_viewer) {
-    // Shading normals may point away from the viewer; the cosine is kept off 0 so that nothing divides by it.
-    float cos_o = max(dot(slab.normal, to_viewer), 1e-4);
-    vec2 table_size = vec2(textureSize(albedo_table, 0));
-    vec2 table = textureLod(albedo_table, (vec2(sqrt(min(cos_o, 1.0)), slab.roughness) * (table_size - 1.0) + 0.5) / table_size, 0.0).rg;
-    SpecularAlbedo specular = specular_albedo(slab.f0, slab.f90, table);
-    // What the interface does not reflect towards the viewer is left to the base. One number for all channels: a tinted
-    // interface must not give the base the complementary color.
-    float base_weight = 1.0 - max(specular.albedo.r, max(specular.albedo.g, specular.albedo.b));
+// Where a surface is lit.
+struct LitPoint {
+    vec3 position;   // world
+    vec3 to_viewer;  // unit
+    float footprint; // meters that a pixel covers
+    float occlusion; // of the environment
+};
 
-    // Environment.
-    vec3 diffuse_light = max(irradiance(slab.normal, irradiance_coefficients), vec3(0.0)) / pi;
-    vec3 mirrored = reflect(-to_viewer, slab.normal);
-    float last_mip = float(ENVIRONMENT_MIPS - 1);
-    vec3 specular_light = textureLod(environment, mirrored, slab.roughness * last_mip).rgb;
-    vec3 result = slab.occlusion * (diffuse_light * slab.diffuse * base_weight + specular_light * specular.albedo);
+// The closure of a slab for all lights and for the environment. bare: as prepare_closure_under has it.
+Closure prepare_lit_closure(Slab slab, Fresnel bare, vec3 view, float footprint) {
+    slab.roughness = max(slab.roughness, smallest_roughness_for_lights);
+    return prepare_closure_under(slab, bare, view, footprint);
+}
 
+// Of the prefiltered environment, around the direction into which a lobe mirrors. Lobes that are stretched mirror at a
+// normal that leans along the stretched direction's complement, as hair-like grooves do.
+vec3 environment_lobe(StoredFrame frame, vec3 to_viewer, float roughness, float anisotropy) {
+    vec3 normal = frame.normal;
+    if (anisotropy != 0.0) {
+        vec3 along = anisotropy >= 0.0 ? frame.bitangent : frame.tangent;
+        vec3 grooved = cross(cross(along, to_viewer), along);
+        normal = normalize(mix(normal, grooved, 0.5 * abs(anisotropy)));
+    }
+    return textureLod(environment, reflect(-to_viewer, normal), roughness * float(ENVIRONMENT_MIPS - 1)).rgb;
+}
+
+// What a closure sends to the viewer of the environment's light: each lobe's share, from where the lobe looks. `diffuse`
+// holds that of fuzz as well, `subsurface` what comes through from behind.
+ClosureValue environment_value(Slab slab, Closure closure, StoredFrame frame, LitPoint point) {
+    ClosureAlbedo albedo = closure_albedo(closure);
+    float anisotropy = 0.0;
+#ifdef NACRE_SLAB_ANISOTROPY
+    if ((slab.features & slab_anisotropy) != 0u) anisotropy = slab.anisotropy;
+#endif
+    vec3 specular_light = environment_lobe(frame, point.to_viewer, slab.roughness, anisotropy);
+    ClosureValue value;
+    value.specular = point.occlusion * albedo.specular * specular_light;
+#ifdef NACRE_SLAB_SECOND_LOBE
+    if ((slab.features & slab_second_lobe) != 0u) {
+        value.specular += point.occlusion * closure.second.albedo *
+                          (environment_lobe(frame, point.to_viewer, slab.second_roughness, anisotropy) - specular_light);
+    }
+#endif
+    vec3 diffuse_light = max(irradiance(frame.normal, irradiance_coefficients), vec3(0.0)) * inverse_pi;
+    value.diffuse = point.occlusion * (albedo.diffuse + albedo.fuzz) * diffuse_light;
+    value.subsurface = vec3(0.0);
+#ifdef NACRE_SLAB_MEDIUM
+    if ((slab.features & slab_medium) != 0u) {
+        value.subsurface = point.occlusion * albedo.transmission *
+                           max(irradiance(-frame.normal, irradiance_coefficients), vec3(0.0)) * inverse_pi;
+    }
+#endif
+    return value;
+}
+
+// A plain slab is a closure without any feature; its interface's grazing reflectance is bounded, as KHR_materials_specular
+// wants it.
+vec3 shade_slab(SingleSlab plain, vec3 position, vec3 to_viewer) {
+    Slab slab;
+    slab.features = 0u;
+    slab.coverage = 1.0;
+    slab.f0 = plain.f0;
+    slab.roughness = plain.roughness;
+    slab.albedo = plain.diffuse;
+    Fresnel bare = make_plain_fresnel(slab.f0);
+    bare.grazing = min(bare.grazing, vec3(plain.f90));
+    StoredFrame frame = frame_of_normal(plain.normal);
+    Closure closure = prepare_lit_closure(slab, bare, view_in_frame(frame, to_viewer), 0.0);
+    LitPoint point;
+    point.position = position;
+    point.to_viewer = to_viewer;
+    point.footprint = 0.0;
+    point.occlusion = plain.occlusion;
+    ClosureValue surroundings = environment_value(slab, closure, frame, point);
+    vec3 result = surroundings.specular + surroundings.diffuse;
 #ifdef LIGHTS
-    float lights_roughness = max(slab.roughness, smallest_roughness_for_lights);
-    float alpha = lights_roughness * lights_roughness;
     for (uint i = 0u; i < light_count.x; ++i) {
-        Light light = lights[i];
         vec3 to_light;
         float distance_to_light;
-        vec3 incident = incident_light(light, position, to_light, distance_to_light);
-        float cos_i = dot(slab.normal, to_light);
-        if (cos_i <= 0.0 || max(incident.r, max(incident.g, incident.b)) <= 0.0) continue;
+        vec3 incident = incident_light(lights[i], position, to_light, distance_to_light);
+        vec3 light = to_frame(frame, to_light);
+        if (light.z <= 0.0 || largest(incident) <= 0.0) continue;
 #ifdef SHADOW_VIEWS
-        incident *= shadow(light, position, slab.normal, to_light, distance_to_light);
+        incident *= shadow(lights[i], position, plain.normal, to_light, distance_to_light);
 #endif
-        vec3 half_vector = to_light + to_viewer;
-        half_vector *= inversesqrt(max(dot(half_vector, half_vector), 1e-12));
-        vec3 fresnel = slab.f0 + (vec3(slab.f90) - slab.f0) * schlick_weight(clamp(dot(to_viewer, half_vector), 0.0, 1.0));
-        vec3 reflected = fresnel * specular.compensation *
-                         (ggx_distribution(slab.normal, half_vector, alpha) * ggx_visibility(cos_o, cos_i, alpha));
-        result += incident * cos_i * (slab.diffuse * (base_weight / pi) + reflected);
+        ClosureValue value = evaluate_closure_above(closure, light);
+        result += incident * (value.specular + value.diffuse);
     }
 #endif
     return min(result, vec3(65504.0));

@@ -102,7 +102,11 @@ SingleSlab evaluate_slab(vec3 color) {
 #ifdef SPECULAR_COLOR_TEXTURE
     f0 *= texture(specular_color_texture, moved_uv(SPECULAR_COLOR_TEXTURE, 6)).rgb;
 #endif
-    slab.diffuse = color * (1.0 - metallic);
+    // A dielectric beside a metal: the albedo of the one slab that scatters as much as the two, of whose light less gets
+    // below the common interface. The dielectric's albedo by its share alone would leave a dark halo between them.
+    vec3 scattering = (1.0 - metallic) * (vec3(1.0) - f0);
+    vec3 entering = scattering + metallic * (vec3(1.0) - color);
+    slab.diffuse = min(color * scattering / max(entering, vec3(1e-6)), vec3(1.0));
     slab.f0 = mix(f0, color, metallic);
     slab.f90 = mix(f90, 1.0, metallic);
     slab.normal = shading_normal();

@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <memory>
+
+#include "materials/building_blocks.h"
+#include "materials/evaluation.h"
 #include "scene/shapes.h"
 #include "tests/passes/renderer_test.h"
 
@@ -8,7 +12,7 @@ namespace {
 RENDERER_SUITE(Emission);
 
 materials::MaterialDescription lamp(const glm::vec3& emission) {
-    materials::MaterialDescription material = lambert(glm::vec3(0.0f));
+    materials::MaterialDescription material = matte(glm::vec3(0.0f));
     material.emissive = emission;
     return material;
 }
@@ -18,7 +22,7 @@ scene::Primitive sheet(float z) { return scene::parallelogram({-1, -1, z}, {2, 0
 TEST_P(Emission, IsAddedToWhatIsReflected) {
     scene::Scene scene = empty_scene();
     scene.environment = uniform_environment(glm::vec3(1.0f));
-    materials::MaterialDescription material = lambert(glm::vec3(0.25f));
+    materials::MaterialDescription material = matte(glm::vec3(0.25f));
     material.emissive = {1.0f, 0.5f, 0.0f};
     material.emissive_strength = 4.0f;
     place(scene, sheet(0.0f), add_material(scene, material));
@@ -26,6 +30,37 @@ TEST_P(Emission, IsAddedToWhatIsReflected) {
     EXPECT_NEAR(shot.radiance_at(16, 16).r, 4.25f, 0.02f);
     EXPECT_NEAR(shot.radiance_at(16, 16).g, 2.25f, 0.02f);
     EXPECT_NEAR(shot.radiance_at(16, 16).b, 0.25f, 5e-3f);
+}
+
+// Light from below a coat has its color, and that of a tree without the plain slab's emission is seen as well.
+TEST_P(Emission, IsTintedByTheLayersAbove) {
+    materials::Tree tree{.name = "lamp"};
+    materials::Slab glow{.albedo = glm::vec3(0.0f)};
+    glow.features = materials::slab_emission;
+    glow.emission = {4.0f, 2.0f, 3.0f};
+    const materials::NodeIndex base = tree.add(glow, "glow");
+    materials::add(tree, materials::CoatedLayer{.coat_color = {0.9f, 0.25f, 0.04f}, .coat_roughness = 0.3f}, base);
+    const auto flat = materials::flatten(tree);
+    ASSERT_TRUE(flat) << flat.error().message();
+    materials::MaterialDescription material{.name = "lamp"};
+    material.tree = std::make_shared<const materials::Tree>(tree);
+    scene::Scene scene = empty_scene();
+    place(scene, sheet(0.0f), add_material(scene, material));
+    const Shot shot = render(scene, {.width = 32, .height = 32, .exposure_ev = 0.0f});
+    glm::dvec3 expected(0.0);
+    for (const materials::ShadedClosure& closure : materials::shade(*flat, {0.0, 0.0, 1.0}).closures) {
+        if ((closure.slab.features & materials::slab_emission) != 0)
+            expected += closure.path.weight * closure.coverage * closure.slab.emission;
+    }
+    const glm::vec3 seen = shot.radiance_at(16, 16);
+    if (GetParam().profile == "mobile" || GetParam().profile == "low") {
+        // One slab stands for both, emission blended into it.
+        EXPECT_GT(seen.r, 3.0f);
+        EXPECT_GT(seen.r, 4.0f * seen.b);
+        return;
+    }
+    EXPECT_LT(expected.b, 1.0) << "the coat takes blue light";
+    for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(seen[channel], expected[channel], 0.01 * expected[channel]);
 }
 
 // Faces that coincide give their light once, and hidden ones none.

@@ -2,12 +2,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/gtc/constants.hpp>
-#include <map>
-#include <vector>
 
+#include "materials/closures/library.h"
 #include "passes/gbuffer_layout.h"
-#include "passes/tables/ggx_albedo_generator.h"
+#include "passes/profiles.h"
 #include "scene/shapes.h"
 #include "tests/passes/renderer_test.h"
 
@@ -20,6 +18,7 @@ using passes::fields_of;
 RENDERER_SUITE(Lighting);
 
 constexpr std::uint32_t side = 128;
+constexpr glm::dvec3 to_viewer(0.0, 0.0, 1.0);
 
 /// The unit ball in the middle of the picture; x and y of a pixel's center on it.
 glm::dvec2 plane_position(std::uint32_t x, std::uint32_t y) {
@@ -32,9 +31,9 @@ scene::Scene ball(const materials::MaterialDescription& material) {
     return scene;
 }
 
-// A diffuse ball under a directional light: albedo / pi * lux * cos.
-TEST_P(Lighting, LambertBallUnderTheSun) {
-    scene::Scene scene = ball(lambert({0.64f, 0.25f, 0.04f}));
+// A diffuse ball under a directional light.
+TEST_P(Lighting, MatteBallUnderTheSun) {
+    scene::Scene scene = ball(matte({0.64f, 0.25f, 0.04f}));
     scene::Light sun = directional_light({-0.6f, -0.5f, -1.0f}, 3.0f);
     sun.casts_shadows = false;
     scene.lights.push_back(sun);
@@ -46,9 +45,8 @@ TEST_P(Lighting, LambertBallUnderTheSun) {
             const double rest = 1.0 - glm::dot(p, p);
             if (rest < 0.1) continue;  // the facets of the mesh show at the rim
             const glm::dvec3 normal(p, std::sqrt(rest));
-            const double cosine = glm::dot(normal, -glm::dvec3(sun.direction));
             const glm::vec3 seen = shot.radiance_at(x, y);
-            const double expected = 0.64 / glm::pi<double>() * 3.0 * std::max(cosine, 0.0);
+            const double expected = 0.64 * 3.0 * matte_value(GetParam(), normal, to_viewer, -glm::dvec3(sun.direction));
             // Albedo has steps of 1 % at 8 bits, the normal of 1e-3.
             ASSERT_NEAR(seen.r, expected, 0.01 * expected + 2e-3) << x << ", " << y;
             ASSERT_NEAR(seen.g, expected * 0.25 / 0.64, 0.01 * expected + 2e-3);
@@ -58,61 +56,23 @@ TEST_P(Lighting, LambertBallUnderTheSun) {
     EXPECT_GT(compared, 5000);
 }
 
-// The terms of the directional albedo, which are smooth: linear between 1024 cosines that are integrated once.
-std::array<double, 2> albedo_terms(double cosine, double roughness) {
-    constexpr int steps = 1024;
-    static std::map<double, std::vector<std::array<double, 2>>> curves;
-    auto& curve = curves[roughness];
-    if (curve.empty()) curve.resize(steps + 1, {-1.0, -1.0});
-    const auto at = [&](int step) {
-        if (curve[step][0] < 0.0) curve[step] = passes::directional_albedo_terms(double(step) / steps, roughness, 48);
-        return curve[step];
-    };
-    const int step = std::clamp(int(cosine * steps), 1, steps - 1);
-    const double fraction = cosine * steps - step;
-    const auto below = at(step), above = at(step + 1);
-    return {below[0] + fraction * (above[0] - below[0]), below[1] + fraction * (above[1] - below[1])};
-}
-
-/// The reflection model of the lighting pass in double precision, written apart from the shader.
-glm::dvec3 reflected_in_double(const glm::dvec3& n, const glm::dvec3& v, const glm::dvec3& l, const glm::dvec3& diffuse,
-                               const glm::dvec3& f0, double f90, double roughness) {
-    const double cos_i = glm::dot(n, l);
-    if (cos_i <= 0.0) return glm::dvec3(0.0);
-    const double cos_o = std::max(glm::dot(n, v), 1e-4);
-    const auto terms = albedo_terms(cos_o, roughness);
-    const double single = terms[0] + terms[1];
-    const glm::dvec3 compensation = 1.0 + f0 * (1.0 / single - 1.0);
-    const glm::dvec3 albedo = glm::min((f0 * terms[0] + f90 * terms[1]) * compensation, glm::dvec3(1.0));
-    const double base = 1.0 - std::max({albedo.x, albedo.y, albedo.z});
-
-    const double alpha = std::pow(std::max(roughness, 0.045), 2.0);
-    const glm::dvec3 h = glm::normalize(l + v);
-    const double cos_h = glm::dot(n, h);
-    const double sin2_h = glm::dot(glm::cross(n, h), glm::cross(n, h));
-    const double d = alpha * alpha / (glm::pi<double>() * std::pow(cos_h * cos_h * alpha * alpha + sin2_h, 2.0));
-    const auto lambda = [alpha](double cosine) {
-        const double tan2 = (1.0 - cosine * cosine) / (cosine * cosine);
-        return 0.5 * (std::sqrt(1.0 + alpha * alpha * tan2) - 1.0);
-    };
-    const double g = 1.0 / (1.0 + lambda(cos_o) + lambda(cos_i));
-    const glm::dvec3 fresnel = f0 + (f90 - f0) * std::pow(1.0 - std::clamp(glm::dot(v, h), 0.0, 1.0), 5.0);
-    const glm::dvec3 specular = fresnel * compensation * (d * g / (4.0 * cos_o * cos_i));
-    return (diffuse * base / glm::pi<double>() + specular) * cos_i;
-}
-
-// Every pixel of a lit ball against the model evaluated in double precision from the same G-buffer words.
-TEST_P(Lighting, AgreesWithTheModelInDoublePrecision) {
+// Every pixel of a lit ball against the closure evaluated in double precision from the same G-buffer words.
+TEST_P(Lighting, AgreesWithTheClosureInDoublePrecision) {
+    using materials::closures::Library;
+    Library library;
     struct Case {
-        float metallic, roughness, ior;
+        float metallic, roughness, ior, specular;
     };
-    for (const Case& c : {Case{0.0f, 0.1f, 1.5f}, Case{0.0f, 0.6f, 2.0f}, Case{1.0f, 0.3f, 1.5f}, Case{1.0f, 1.0f, 1.5f},
-                          Case{0.5f, 0.0f, 1.5f}}) {
+    const bool is_lambert =
+        (*passes::find_profile(GetParam().profile))->diffuse_model == passes::DiffuseModel::lambert;
+    for (const Case& c : {Case{0.0f, 0.1f, 1.5f, 1.0f}, Case{0.0f, 0.6f, 2.0f, 0.5f}, Case{1.0f, 0.3f, 1.5f, 1.0f},
+                          Case{1.0f, 1.0f, 1.5f, 1.0f}, Case{0.5f, 0.0f, 1.5f, 1.0f}}) {
         materials::MaterialDescription material{.name = "model"};
         material.base_color = {0.9f, 0.5f, 0.2f, 1.0f};
         material.metallic = c.metallic;
         material.roughness = c.roughness;
         material.ior = c.ior;
+        material.specular = materials::Specular{.factor = c.specular};
         scene::Scene scene = ball(material);
         scene::Light sun = directional_light({-0.4f, -0.8f, -1.0f}, 2.0f);
         sun.casts_shadows = false;
@@ -129,7 +89,7 @@ TEST_P(Lighting, AgreesWithTheModelInDoublePrecision) {
             }
             return std::array<float, 3>{};
         };
-        const glm::dvec3 l = -glm::dvec3(sun.direction), v(0, 0, 1);
+        const glm::dvec3 l = -glm::dvec3(sun.direction);
         double worst = 0.0;
         int compared = 0;
         for (std::uint32_t i = 0; i < words_0.size(); ++i) {
@@ -139,9 +99,21 @@ TEST_P(Lighting, AgreesWithTheModelInDoublePrecision) {
             const glm::dvec3 f0(field("f0_r", words_1[i])[0], field("f0_g", words_1[i])[0], field("f0_b", words_1[i])[0]);
             const auto n = field("normal", tops[i]);
             const glm::dvec3 normal = glm::normalize(glm::dvec3(n[0], n[1], n[2]));
-            if (normal.z < 0.15) continue;  // the table is interpolated where it is steep; see tables_test.cpp
-            const glm::dvec3 expected = 2.0 * reflected_in_double(normal, v, l, diffuse, f0, field("f90", words_1[i])[0],
-                                                                  field("roughness", tops[i])[0]);
+            if (normal.z < 1e-3) continue;
+            const double f90 = field("f90", words_1[i])[0];
+            Library::Slab slab{.features = 0, .coverage = 1.0, .f0 = f0, .albedo = diffuse};
+            slab.roughness = std::max(double{field("roughness", tops[i])[0]}, 0.045);
+            Library::Fresnel bare = library.slab_fresnel(slab);
+            bare.grazing = glm::min(bare.grazing, glm::dvec3(f90));
+            const Library::Closure closure =
+                library.prepare_closure_under(slab, bare, in_frame_of(normal, to_viewer), 0.0);
+            const glm::dvec3 light = in_frame_of(normal, l);
+            const Library::ClosureValue value = library.evaluate_closure(closure, light);
+            const double lobe = is_lambert ? library.lambert_diffuse(light)
+                                           : library.chan_diffuse_of(closure.chan, std::max(light.z, 0.0),
+                                                                     library.half_vector_cosine(closure.view, light),
+                                                                     library.half_vector(closure.view, light).z);
+            const glm::dvec3 expected = 2.0 * (value.specular + closure.diffuse * lobe);
             const glm::vec3 seen = shot.radiance_at(i % side, i / side);
             // Half floats have 11 bits; below 1e-4 their steps are even.
             for (int channel = 0; channel < 3; ++channel) {
@@ -154,10 +126,10 @@ TEST_P(Lighting, AgreesWithTheModelInDoublePrecision) {
     }
 }
 
-// A point light over a diffuse floor: candela / distance^2, fading to nothing at its range.
+// A point light over a matte floor: candela / distance^2, fading to nothing at its range.
 TEST_P(Lighting, PointLightFollowsDistanceAndRange) {
     scene::Scene scene = empty_scene();
-    place(scene, scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), add_material(scene, lambert(glm::vec3(1.0f))));
+    place(scene, scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), add_material(scene, matte(glm::vec3(1.0f))));
     scene::Light lamp{.name = "lamp", .kind = scene::LightKind::point, .intensity = 2.0f, .position = {0, 0, 0.5f}};
     lamp.range = 0.9f;
     lamp.casts_shadows = false;
@@ -167,8 +139,8 @@ TEST_P(Lighting, PointLightFollowsDistanceAndRange) {
         const glm::dvec2 p = plane_position(x, side / 2);
         const double distance2 = glm::dot(p, p) + 0.25;
         const double window = std::clamp(1.0 - std::pow(distance2 / 0.81, 2.0), 0.0, 1.0);
-        const double cosine = 0.5 / std::sqrt(distance2);
-        const double expected = 2.0 * window / distance2 * cosine / glm::pi<double>();
+        const glm::dvec3 to_light = glm::normalize(glm::dvec3(-p, 0.5));
+        const double expected = 2.0 * window / distance2 * matte_value(GetParam(), to_viewer, to_viewer, to_light);
         ASSERT_NEAR(shot.radiance_at(x, side / 2).g, expected, 2e-3 * expected + 1e-4) << x;
     }
 }
@@ -176,7 +148,7 @@ TEST_P(Lighting, PointLightFollowsDistanceAndRange) {
 // A spot light: full inside the inner cone, nothing outside the outer one, the glTF falloff between.
 TEST_P(Lighting, SpotLightFollowsItsCone) {
     scene::Scene scene = empty_scene();
-    place(scene, scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), add_material(scene, lambert(glm::vec3(1.0f))));
+    place(scene, scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), add_material(scene, matte(glm::vec3(1.0f))));
     scene::Light lamp{.name = "spot", .kind = scene::LightKind::spot, .intensity = 4.0f, .position = {0, 0, 1}};
     lamp.direction = {0, 0, -1};
     lamp.inner_cone_angle = 0.3f;
@@ -189,7 +161,8 @@ TEST_P(Lighting, SpotLightFollowsItsCone) {
         const double distance2 = glm::dot(p, p) + 1.0, cosine = 1.0 / std::sqrt(distance2);
         const double scale = 1.0 / (std::cos(0.3) - std::cos(0.6));
         const double falloff = std::pow(std::clamp(scale * (cosine - std::cos(0.6)), 0.0, 1.0), 2.0);
-        const double expected = 4.0 * falloff / distance2 * cosine / glm::pi<double>();
+        const glm::dvec3 to_light = glm::normalize(glm::dvec3(-p, 1.0));
+        const double expected = 4.0 * falloff / distance2 * matte_value(GetParam(), to_viewer, to_viewer, to_light);
         ASSERT_NEAR(shot.radiance_at(x, side / 2).g, expected, 5e-3 * expected + 5e-4) << x;
     }
 }
@@ -211,13 +184,14 @@ TEST_P(Lighting, UnlitIsShownAsItIs) {
 // Mirrored and unevenly scaled instances keep their outward normals.
 TEST_P(Lighting, NormalsSurviveMirroringAndScale) {
     scene::Scene scene = empty_scene();
-    const std::uint32_t material = add_material(scene, lambert(glm::vec3(1.0f)));
+    const std::uint32_t material = add_material(scene, matte(glm::vec3(1.0f)));
     glm::mat4 left(1.0f), right(1.0f);
     left[0][0] = 0.4f, left[1][1] = 0.8f, left[2][2] = 1e-3f, left[3] = glm::vec4(-0.5f, 0, 0, 1);
     right[0][0] = -0.4f, right[1][1] = 0.8f, right[2][2] = 1e-3f, right[3] = glm::vec4(0.5f, 0, 0, 1);
     place(scene, scene::sphere(1.0f, 32, 16), material, left);
     place(scene, scene::sphere(1.0f, 32, 16), material, right);
-    scene::Light sun = directional_light({0, 0, -1}, glm::pi<float>());
+    const double lobe = matte_value(GetParam(), to_viewer, to_viewer, to_viewer);
+    scene::Light sun = directional_light({0, 0, -1}, static_cast<float>(1.0 / lobe));
     sun.casts_shadows = false;
     scene.lights.push_back(sun);
     const Shot shot = render(scene, {.width = side, .height = side, .exposure_ev = 0.0f});

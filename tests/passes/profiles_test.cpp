@@ -25,6 +25,7 @@ TEST(Profiles, BudgetsNeverFall) {
         EXPECT_LE(a.blend_groups, b.blend_groups) << b.name;
         EXPECT_LE(a.storage_in_fragment, b.storage_in_fragment) << b.name;
         EXPECT_LE(a.float_color_targets, b.float_color_targets) << b.name;
+        EXPECT_FALSE(a.diffuse_model == DiffuseModel::chan && b.diffuse_model == DiffuseModel::lambert) << b.name;
     }
 }
 

@@ -16,7 +16,7 @@ scene::Scene small_scene() {
     scene::Scene scene = empty_scene();
     scene.environment = uniform_environment(glm::vec3(0.5f));
     place(scene, scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}),
-          add_material(scene, lambert(glm::vec3(0.5f))));
+          add_material(scene, matte(glm::vec3(0.5f))));
     scene.lights.push_back(directional_light({0, -1, -1}, 1.0f));
     return scene;
 }
@@ -93,7 +93,7 @@ TEST_P(RendererFaults, WhereNothingCanBeSeenTheEnvironmentIs) {
     scene.environment = uniform_environment(glm::vec3(0.5f));
     scene.cameras.clear();
     expect_environment(scene, "no camera");
-    const std::uint32_t material = add_material(scene, lambert(glm::vec3(0.0f)));
+    const std::uint32_t material = add_material(scene, matte(glm::vec3(0.0f)));
     place(scene, scene::parallelogram({-100, -100, -1}, {200, 0, 0}, {0, 200, 0}), material);
     scene.instances[0].transforms.clear();
     expect_environment(scene, "no instance");

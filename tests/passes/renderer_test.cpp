@@ -6,6 +6,8 @@
 #include <mutex>
 
 #include "core/disk_cache.h"
+#include "materials/closures/library.h"
+#include "passes/profiles.h"
 #include "samples/backends.h"
 
 namespace nacre::test {
@@ -179,12 +181,28 @@ std::uint32_t add_material(scene::Scene& scene, const materials::MaterialDescrip
     return static_cast<std::uint32_t>(scene.materials.size() - 1);
 }
 
-materials::MaterialDescription lambert(const glm::vec3& albedo) {
-    materials::MaterialDescription material{.name = "lambert"};
+materials::MaterialDescription matte(const glm::vec3& albedo) {
+    materials::MaterialDescription material{.name = "matte"};
     material.base_color = glm::vec4(albedo, 1.0f);
     material.metallic = 0.0f;
     material.specular = materials::Specular{.factor = 0.0f};
     return material;
+}
+
+glm::dvec3 in_frame_of(const glm::dvec3& normal, const glm::dvec3& direction) {
+    const glm::dvec3 axis = std::abs(normal.x) < 0.7 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+    const glm::dvec3 tangent = glm::normalize(axis - normal * glm::dot(axis, normal));
+    return {glm::dot(direction, tangent), glm::dot(direction, glm::cross(normal, tangent)), glm::dot(direction, normal)};
+}
+
+double matte_value(const RenderVariant& variant, const glm::dvec3& normal, const glm::dvec3& to_viewer,
+                   const glm::dvec3& to_light) {
+    materials::closures::Library library;
+    const glm::dvec3 view = in_frame_of(normal, to_viewer), light = in_frame_of(normal, to_light);
+    if ((*passes::find_profile(variant.profile))->diffuse_model == passes::DiffuseModel::lambert)
+        return library.lambert_diffuse(light);
+    const double gloss = library.chan_gloss(1.0);
+    return library.chan_diffuse(view, light, gloss) / library.chan_albedo_by_table(std::min(view.z, 1.0), gloss);
 }
 
 void place(scene::Scene& scene, scene::Primitive primitive, std::uint32_t material, const glm::mat4& transform) {

@@ -88,8 +88,14 @@ scene::Scene empty_scene();
 scene::Environment uniform_environment(const glm::vec3& radiance);
 /// Adds a material; returns its index.
 std::uint32_t add_material(scene::Scene& scene, const materials::MaterialDescription& material);
-/// A material that only scatters diffusely.
-materials::MaterialDescription lambert(const glm::vec3& albedo);
+/// A material of roughness 1 that only scatters diffusely.
+materials::MaterialDescription matte(const glm::vec3& albedo);
+/// What a matte surface of albedo 1 sends to the viewer of a light of 1 lux, by the variant's profile; unit vectors, in
+/// double precision.
+double matte_value(const RenderVariant& variant, const glm::dvec3& normal, const glm::dvec3& to_viewer,
+                   const glm::dvec3& to_light);
+/// A direction in a frame whose z is the normal, for surfaces that look alike however they are turned.
+glm::dvec3 in_frame_of(const glm::dvec3& normal, const glm::dvec3& direction);
 /// Places a primitive with a material.
 void place(scene::Scene& scene, scene::Primitive primitive, std::uint32_t material,
            const glm::mat4& transform = glm::mat4(1.0f));

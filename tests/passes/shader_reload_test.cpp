@@ -56,7 +56,7 @@ class ShaderReload : public RendererTest {
         scene::Scene scene = empty_scene();
         scene.environment = uniform_environment(glm::vec3(1.0f));
         place(scene, scene::parallelogram({-2, -2, 0}, {4, 0, 0}, {0, 4, 0}),
-              add_material(scene, lambert({0.8f, 0.4f, 0.2f})));
+              add_material(scene, matte({0.8f, 0.4f, 0.2f})));
         return render(scene, {.width = 16,
                               .height = 16,
                               .exposure_ev = 0.0f,

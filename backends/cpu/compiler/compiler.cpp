@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <llvm/IR/LLVMContext.h>
+#include <llvm/IR/Verifier.h>
 #include <llvm/Support/raw_ostream.h>
 
 #include <cstdlib>
@@ -61,6 +62,7 @@ class ShaderCompilation final : public Compiler {
         program.in_double = all_.options.mode == ExecutionMode::double_precision;
         program.narrowed = std::move(narrowed);
         program.name = std::string(source.name);
+        if (!code) return program;
         program.run = reinterpret_cast<VertexFunction>(static_cast<LoadedCode&>(*code).find("kernel"));
         program.code = std::move(code);
         if (!program.run) return missing(source);
@@ -82,6 +84,7 @@ class ShaderCompilation final : public Compiler {
         program.in_double = all_.options.mode == ExecutionMode::double_precision;
         program.narrowed = std::move(narrowed);
         program.name = std::string(source.name);
+        if (!code) return program;
         program.run = reinterpret_cast<FragmentFunction>(static_cast<LoadedCode&>(*code).find("kernel"));
         program.code = std::move(code);
         if (!program.run) return missing(source);
@@ -115,6 +118,7 @@ class ShaderCompilation final : public Compiler {
                                         },
                                         &stack_bytes));
         program.narrowed = std::move(narrowed);
+        if (!program.code) return program;
         auto& code = static_cast<LoadedCode&>(*program.code);
         program.run = reinterpret_cast<ComputeFunction>(code.find("kernel"));
         if (!program.run) return missing(source);
@@ -150,7 +154,7 @@ class ShaderCompilation final : public Compiler {
         std::map<std::uint32_t, std::string> narrowed;
     };
 
-    /// Runs `emit`, which gives an Emitted, on a new LLVM module and makes code of it.
+    /// Runs `emit`, which gives an Emitted, on a new LLVM module and makes code of it; null where that is not wanted.
     /// @param too_large_stack  gets the bytes of stack that the code takes where that is too much
     template <typename Emit>
     Expected<std::shared_ptr<CompiledCode>> compile(const Variant& how, const ShaderSource& source, spv::ExecutionModel model,
@@ -189,6 +193,12 @@ class ShaderCompilation final : public Compiler {
             source.trace->shader = source.name;
             for (std::size_t i = 0; i < source.trace->offsets.size(); ++i)
                 source.trace->instructions[i].line = rhi::spirv::source_line(words, source.trace->offsets[i]);
+        }
+        if (how.options.only_translates) {
+            if (llvm::verifyModule(*target))
+                return fail(ErrorCode::internal, "compile shader", fmt::format("'{}'", source.name), "its LLVM module is not valid",
+                            "Use another backend.");
+            return nullptr;
         }
         // Code that is traced refers to addresses of this process.
         const bool use_disk_cache = how.options.use_disk_cache && !source.trace;

@@ -123,7 +123,7 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
                 Component made_product = apply({a, b}, [&](Values v) { return builder.CreateMul(v[0], v[1]); });
                 if (a.linear_base && factor && factor->getBitWidth() == 32)
                     made_product.linear_base = builder.CreateMul(a.linear_base, b.value),
-                    made_product.linear_stride = a.linear_stride * factor->getSExtValue();
+                    made_product.linear_stride = Component::wrapped(a.linear_stride * factor->getZExtValue());
                 made.push_back(made_product);
             }
             return made;
@@ -138,7 +138,7 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
                 const auto* amount = llvm::dyn_cast<llvm::ConstantInt>(b.value);
                 if (a.linear_base && amount && amount->getBitWidth() == 32 && amount->getZExtValue() < 31)
                     shifted.linear_base = builder.CreateShl(a.linear_base, amount->getZExtValue()),
-                    shifted.linear_stride = a.linear_stride << amount->getZExtValue();
+                    shifted.linear_stride = Component::wrapped(static_cast<std::uint64_t>(a.linear_stride) << amount->getZExtValue());
                 made.push_back(shifted);
             }
             return made;

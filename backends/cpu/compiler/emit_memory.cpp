@@ -416,7 +416,7 @@ Component Emitter::load_bytes(const Pointer& pointer, std::int64_t extra, const 
     }
     llvm::Value* lanes_on = ok ? both(mask, ok.value) : mask;
     llvm::Value* none = llvm::Constant::getNullValue(vector_of(kind));
-    if (pointer.base.is_uniform() && pointer.dynamic_offset.linear_base && pointer.dynamic_offset.linear_stride == bytes) {
+    if (pointer.base.is_uniform() && pointer.dynamic_offset.linear_base && pointer.dynamic_offset.linear_stride == std::int64_t{bytes}) {
         llvm::Value* start = builder.CreateGEP(builder.getInt8Ty(), at_offset(pointer.base.value, pointer.offset + extra),
                                                builder.CreateSExt(pointer.dynamic_offset.linear_base, builder.getInt64Ty()));
         return finish(builder.CreateMaskedLoad(vector_of(kind), start, alignment, lanes_on, none));
@@ -453,7 +453,7 @@ void Emitter::store_bytes(const Pointer& pointer, std::int64_t extra, const Type
         return;
     }
     llvm::Value* values = widen(stored);
-    if (pointer.base.is_uniform() && pointer.dynamic_offset.linear_base && pointer.dynamic_offset.linear_stride == bytes) {
+    if (pointer.base.is_uniform() && pointer.dynamic_offset.linear_base && pointer.dynamic_offset.linear_stride == std::int64_t{bytes}) {
         llvm::Value* start = builder.CreateGEP(builder.getInt8Ty(), at_offset(pointer.base.value, pointer.offset + extra),
                                                builder.CreateSExt(pointer.dynamic_offset.linear_base, builder.getInt64Ty()));
         builder.CreateMaskedStore(values, start, alignment, lanes_on);

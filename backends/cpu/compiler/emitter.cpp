@@ -154,10 +154,10 @@ Component Emitter::apply(std::span<const Component> arguments,
 
 Component Emitter::linear(llvm::Value* base, std::int64_t stride) {
     std::vector<std::uint32_t> steps(lanes);
-    for (std::uint32_t i = 0; i < lanes; ++i) steps[i] = static_cast<std::uint32_t>(i * stride);
+    for (std::uint32_t i = 0; i < lanes; ++i) steps[i] = i * static_cast<std::uint32_t>(stride);
     Component result = builder.CreateAdd(splat(base), llvm::ConstantDataVector::get(context, steps));
     result.linear_base = base;
-    result.linear_stride = stride;
+    result.linear_stride = Component::wrapped(static_cast<std::uint64_t>(stride));
     return result;
 }
 
@@ -171,7 +171,7 @@ Component Emitter::add(const Component& a, const Component& b) {
         sum.linear_base = builder.CreateAdd(b.linear_base, a.value), sum.linear_stride = b.linear_stride;
     else if (a.linear_base && b.linear_base)
         sum.linear_base = builder.CreateAdd(a.linear_base, b.linear_base),
-        sum.linear_stride = a.linear_stride + b.linear_stride;
+        sum.linear_stride = Component::wrapped(static_cast<std::uint64_t>(std::int64_t{a.linear_stride} + b.linear_stride));
     return sum;
 }
 
@@ -181,7 +181,8 @@ Component Emitter::multiply(const Component& a, std::int64_t factor) {
         return builder.CreateMul(v[0], llvm::ConstantInt::getSigned(v[0]->getType(), static_cast<std::int32_t>(factor)));
     });
     if (a.linear_base)
-        product.linear_base = builder.CreateMul(a.linear_base, int32(factor)), product.linear_stride = a.linear_stride * factor;
+        product.linear_base = builder.CreateMul(a.linear_base, int32(factor)),
+        product.linear_stride = Component::wrapped(a.linear_stride * static_cast<std::uint64_t>(factor));
     return product;
 }
 

@@ -40,12 +40,14 @@ struct Component {
     llvm::Value* value = nullptr;
     /// Where the lanes rise evenly: value of lane i is linear_base + i * linear_stride (modulo 2^32).
     llvm::Value* linear_base = nullptr;
-    std::int64_t linear_stride = 0;
+    std::int32_t linear_stride = 0;
     /// Lanes whose value depends on something that nothing has written: i1, or a vector of it. Null: none, or nobody asks.
     llvm::Value* undefined = nullptr;
 
     Component() = default;
     Component(llvm::Value* only) : value(only) {}  // NOLINT: a component is its value.
+    /// A stride modulo 2^32.
+    static std::int32_t wrapped(std::uint64_t stride) { return static_cast<std::int32_t>(static_cast<std::uint32_t>(stride)); }
     [[nodiscard]] bool is_uniform() const { return !value->getType()->isVectorTy(); }
     explicit operator bool() const { return value != nullptr; }
 };
@@ -284,6 +286,9 @@ class Emitter {
     std::vector<Component> fetch_directly(const Component& image, Id image_type,
                                           const std::vector<Component>& coordinates, const Component& level,
                                           const std::function<std::vector<Component>()>& otherwise);
+    /// The texel that all lanes ask for, in fragment shaders: a value that LLVM may compute once for all batches.
+    std::vector<Component> fetch_once(const Component& image, Id image_type, const std::vector<Component>& coordinates,
+                                      const Component& level, std::uint32_t flags);
     /// False: nothing was emitted.
     bool store_directly(const Component& image, Id image_type, const std::vector<Component>& coordinates,
                         const std::vector<Component>& texel, const std::function<void()>& otherwise);
