@@ -39,7 +39,9 @@
 //     vec3 closure_transmittance(Closure closure, float cos_theta)    straight through the medium, by outer direction
 //     vec3 closure_throughput(Closure closure)                        of the view: through fuzz, interface and medium
 //     float slab_coverage(Slab slab, float cos_theta)                 where a slab may have slab_edge_coverage
+//     float slab_bare(Slab slab, float cos_theta)                     the rest of the surface
 //     vec3 internal_transmittance(Slab slab)                          of diffuse light from the medium's side
+//     vec3 internal_reflectance(Slab slab)                            the rest of that
 //
 // With NACRE_CLOSURE_COVERED (materials/closures/operators.glsl defines it) closures may be seen through layers:
 //     Closure cover_closure(Closure closure, vec3 spread, float under_interface)
@@ -267,18 +269,30 @@ vec3 internal_transmittance(Slab slab) {
     return clamp(mean / (ior * ior), vec3(0.05), vec3(1.0));
 }
 
+// 1 - internal_transmittance, with all digits where the medium is hardly denser.
+vec3 internal_reflectance(Slab slab) {
+    Fresnel fresnel = slab_fresnel(slab);
+    vec3 root = sqrt(clamp(slab.f0, vec3(0.0), vec3(0.2)));
+    vec3 outside = (vec3(1.0) + root) * (vec3(1.0) + root);
+    // 1 - 1 / ior^2 is 4 root / (1 + root)^2.
+    return min(fresnel_mean(fresnel) + fresnel_mean_transmittance(fresnel) * 4.0 * root / outside, vec3(0.95));
+}
+
 #ifdef NACRE_SLAB_MEDIUM
 // What becomes of light inside the slab, for each channel.
 struct MediumScattering {
     vec3 reflected;  // back to the interface
     vec3 through;    // scattered, out of the far side
     vec3 straight;   // out of the far side without an event
+    vec3 absorbed;
+    vec3 kept;  // what is not reflected: the sum of the three above
     vec3 opaque;
 };
 
 // Light that goes up from the medium to the interface in all, where what it throws back is reflected again, and again.
-vec3 upwards_in_medium(vec3 reflected, vec3 leaving, vec3 reflected_again) {
-    return reflected / max((vec3(1.0) - reflected_again) + leaving * reflected_again, vec3(1e-9));
+// kept_again: 1 - reflected_again.
+vec3 upwards_in_medium(vec3 reflected, vec3 leaving, vec3 reflected_again, vec3 kept_again) {
+    return reflected / max(kept_again + leaving * reflected_again, vec3(1e-9));
 }
 
 // One channel. The authored albedo has the interface's part in it, which lets `leaving` of diffuse light out and throws
@@ -299,6 +313,8 @@ MediumScattering slab_scattering(Slab slab, float cosine) {
     medium.reflected = vec3(x.reflected, y.reflected, z.reflected);
     medium.through = vec3(x.through, y.through, z.through);
     medium.straight = vec3(x.straight, y.straight, z.straight);
+    medium.absorbed = vec3(x.absorbed, y.absorbed, z.absorbed);
+    medium.kept = medium.through + medium.straight + medium.absorbed;
     medium.opaque = vec3(x.opaque, y.opaque, z.opaque);
     return medium;
 }
@@ -416,7 +432,7 @@ Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprin
         vec3 leaving = internal_transmittance(slab);
         MediumScattering medium = slab_scattering(slab, inside);
         MediumScattering again = slab_scattering(slab, mean_cosine);
-        vec3 upwards = upwards_in_medium(medium.reflected, leaving, again.reflected);
+        vec3 upwards = upwards_in_medium(medium.reflected, leaving, again.reflected, again.kept);
         vec3 share = vec3(subsurface_share(slab.albedo.x, slab.mean_free_path.x, footprint),
                           subsurface_share(slab.albedo.y, slab.mean_free_path.y, footprint),
                           subsurface_share(slab.albedo.z, slab.mean_free_path.z, footprint));
@@ -674,6 +690,14 @@ vec3 closure_throughput(Closure closure) {
 float slab_coverage(Slab slab, float cos_theta) {
     if ((slab.features & slab_edge_coverage) == 0u) return slab.coverage;
     return view_dependent_coverage(slab.coverage, slab.edge_coverage, slab.edge_exponent, cos_theta);
+}
+
+// 1 - slab_coverage, with all digits where that is near 1.
+float slab_bare(Slab slab, float cos_theta) {
+    if ((slab.features & slab_edge_coverage) == 0u) return max(1.0 - slab.coverage, 0.0);
+    return max((1.0 - slab.coverage) * facing_share(cos_theta, slab.edge_exponent) +
+                   (1.0 - slab.edge_coverage) * grazing_share(cos_theta, slab.edge_exponent),
+               0.0);
 }
 #endif
 

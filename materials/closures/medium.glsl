@@ -11,6 +11,7 @@ struct Scattering {
     float reflected;
     float through;   // scattered, out of the far side
     float straight;  // out of the far side without an event
+    float absorbed;  // the rest, but not found as what the others leave of 1
     float opaque;    // how much of `reflected` is that of an infinitely thick medium, [0, 1]
 };
 
@@ -24,35 +25,42 @@ Scattering medium_scattering(float albedo, float darkness, float depth, float ph
     Scattering result;
     float similarity = medium_similarity(albedo, darkness);
     float dissimilarity = medium_dissimilarity(albedo);
-    float single = dissimilarity * (2.0 - dissimilarity);
-    float inverse = 1.0 / (1.0 - phase_anisotropy * similarity * similarity);
+    // The constants of both fits are rounded: the smaller one counts, so that what is scattered and absorbed makes 1.
+    bool is_bright = similarity < 0.5;
+    float single = is_bright ? 1.0 - similarity * similarity : dissimilarity * (2.0 - dissimilarity);
+    float absorption = is_bright ? similarity * similarity : 1.0 - single;
+    float inverse = 1.0 / (1.0 - phase_anisotropy * absorption);
     float reduced = depth * (1.0 - phase_anisotropy) * inverse;
     float column = sqrt(clamp(cosine, 0.0, 1.0));
     float row = medium_table_row(reduced);
     float slice = sqrt(similarity);
     vec2 entry = medium_table(vec3(column, row, slice));
     vec2 infinite = medium_table(vec3(column, 1.0, slice));
-    float hit = exponential_rest(reduced / max(cosine, smallest_cosine));
+    float inside = max(cosine, smallest_cosine);
+    float hit = exponential_rest(reduced / inside);
     // Deeper than the table, what comes through falls with the depth.
-    float forth = max(1.0 - entry.x, 0.0) * min(4096.0 / max(reduced, 1e-6), 1.0);
+    float forth = entry.x * min(4096.0 / max(reduced, 1e-6), 1.0);
     float back = 1.0 - forth;
-    float escaping = hit * single * entry.y;
+    float escaping = hit * single * (1.0 - entry.y);
+    float reflected = escaping * back;
+    float absorbed = hit * (absorption + single * entry.y);
     result.opaque = hit * hit * saturated(2.0 * back - 1.0);
-    // An infinitely thick medium reflects its albedo towards every angle, as an opaque one does.
-    float toward_albedo = mix(1.0, albedo / max(single * infinite.y, 1e-30), result.opaque);
+    // An infinitely thick medium reflects its albedo towards every angle, as an opaque one does. The difference is that
+    // of the smaller numbers, of what is reflected or of what is not.
+    float infinite_albedo = single * (1.0 - infinite.y);
+    float missing = albedo < 0.5 ? albedo - infinite_albedo : absorption + single * infinite.y - darkness;
+    // What is added must be there to be had.
+    float added = min(reflected * result.opaque * missing / max(infinite_albedo, 1e-30), absorbed);
+    result.reflected = reflected + added;
+    result.absorbed = absorbed - added;
     // Of the light that the isotropic medium lets through straight, this one scatters some forward; a backward phase
     // function takes some of it.
-    float inside = max(cosine, smallest_cosine);
     float forward = depth * phase_anisotropy * single * inverse / inside;
     result.straight = exp(-depth / inside);
     float through = escaping * forth + (forward > 0.0 ? exp(-reduced / inside) * exponential_rest(forward)
-                                                             : -result.straight * exponential_rest(-forward));
+                                                      : -result.straight * exponential_rest(-forward));
     result.through = max(through, 0.0);
     result.straight = max(result.straight + min(through, 0.0), 0.0);
-    // What is added for that must be there to be had.
-    float reflected = escaping * back;
-    float added = similarity > 0.0 ? reflected * (toward_albedo - 1.0) : 0.0;
-    result.reflected = reflected + min(added, max(1.0 - reflected - result.through - result.straight, 0.0));
     return result;
 }
 
