@@ -43,10 +43,11 @@ void main() {
         for (uint k = 0u; k < LIGHTS_PER_POINT; ++k) {
             // With one light for each slab they take turns.
             vec4 light = lights[LIGHTS_PER_POINT > 1u ? k : i];
+            if (light.z <= 0.0) continue;
 #ifdef BY_HAND
             sum += light.w * evaluate(prepared, light.xyz);
 #else
-            ClosureValue value = evaluate_closure(closure, light.xyz);
+            ClosureValue value = evaluate_closure_above(closure, light.xyz);
             sum += light.w * (value.specular + value.diffuse);
 #endif
         }

@@ -63,8 +63,9 @@ struct Work {
     const char* name;
     std::uint32_t lights_per_point, points_per_invocation, invocations;
 };
-// About as many evaluations in all as a picture of 1280 x 720 under a few lights has.
-constexpr Work works[] = {{"64 lights for each slab", light_count, 1, 1u << 16}, {"1 light for each slab", 1, 8, 1u << 16}};
+// 17 and 2 million evaluations.
+constexpr Work works[] = {{"64 lights for each slab", light_count, 1, 1u << 18},
+                          {"1 light for each slab", 1, 8, 1u << 18}};
 
 std::vector<Point> make_points() {
     std::mt19937 random(3);
@@ -105,7 +106,8 @@ class Kernel {
                                              {"POINTS_PER_INVOCATION", fmt::format("{}u", work.points_per_invocation)}};
         if (by_hand) defines.push_back({"BY_HAND"});
         ShaderCompiler compiler({.embedded = {closure_cost::embedded_files(), materials::embedded_files()}});
-        NACRE_TRY(const ShaderDesc desc, compiler.compile({.path = "benchmarks/closure_cost.comp", .defines = defines}));
+        NACRE_TRY(const ShaderDesc desc,
+                  compiler.compile({.path = "benchmarks/closure_cost.comp", .defines = defines}));
         NACRE_TRY(const Shader shader, device.create_shader(desc));
         NACRE_TRY(kernel.pipeline_, device.create_compute_pipeline({.shader = shader, .name = work.name}));
         const auto points = make_points();
@@ -215,7 +217,7 @@ Expected<bool> compare(Device& device, const std::string& backend, std::uint32_t
     return is_close;
 }
 
-/// A wall that fills the picture, under eight lights without shadows, of a material with this many closures side by side.
+/// A wall that fills the picture, under eight lights without shadows, of a material with so many closures side by side.
 scene::Scene wall(std::uint32_t closures) {
     scene::Scene scene{.name = "wall"};
     materials::MaterialDescription material{.name = "mix"};

@@ -76,24 +76,21 @@ Prepared prepare(vec3 f0, float roughness, vec3 albedo, vec3 view) {
     return p;
 }
 
+// For a light above the surface.
 vec3 evaluate(Prepared p, vec3 light) {
-    vec3 value = vec3(0.0);
-    if (light.z > 0.0) {
-        vec3 sum = p.view + light;
-        float length_squared = dot(sum, sum);
-        float inverse_length = inversesqrt(length_squared);
-        vec3 h = sum * inverse_length;
-        float c = 0.5 * length_squared * inverse_length;
-        float rest = fifth_power(1.0 - c);
+    vec3 sum = p.view + light;
+    float length_squared = dot(sum, sum);
+    float inverse_length = inversesqrt(length_squared);
+    vec3 h = sum * inverse_length;
+    float c = min(0.5 * length_squared * inverse_length, 1.0);
+    float rest = fifth_power(1.0 - c);
 
-        float light_length = sqrt(p.alpha2 * dot(light.xy, light.xy) + light.z * light.z);
-        float k = dot(h.xy, h.xy) + p.alpha2 * (h.z * h.z);
-        float lobe = p.alpha2 * light.z / (k * k * (light.z * p.view_length + p.view.z * light_length));
+    float light_length = sqrt(p.alpha2 * dot(light.xy, light.xy) + light.z * light.z);
+    float k = dot(h.xy, h.xy) + p.alpha2 * (h.z * h.z);
+    float lobe = p.alpha2 * light.z / (k * k * (light.z * p.view_length + p.view.z * light_length));
 
-        float glossy = 1.0 - 0.75 * fifth_power(1.0 - light.z);
-        float retro = c * exp2(-p.sharpness * sqrt(h.z));
-        float diffuse = (p.chan.x * (c + rest) + p.chan.y * glossy + p.chan.z * retro) * light.z;
-        value = (p.f0 + p.rise * rest) * lobe + p.diffuse * diffuse;
-    }
-    return value;
+    float glossy = 1.0 - 0.75 * fifth_power(1.0 - light.z);
+    float retro = c * exp2(-p.sharpness * sqrt(h.z));
+    float diffuse = (p.chan.x * (c + rest) + p.chan.y * glossy + p.chan.z * retro) * light.z;
+    return (p.f0 + p.rise * rest) * lobe + p.diffuse * diffuse;
 }

@@ -19,7 +19,7 @@ install(EXPORT nacre-targets NAMESPACE nacre:: DESTINATION "${package_dir}")
 # The interface: what users of a part include. The rest of its headers is how it works inside.
 set(public_headers
   core/disk_cache.h core/dynamic_library.h core/embedded_file.h core/error.h core/file.h core/hash.h core/image.h
-  core/log.h core/progress.h core/srgb.h
+  core/log.h core/progress.h core/srgb.h core/text_position.h
   rhi/acceleration_structure.h rhi/backend.h rhi/capabilities.h rhi/command_list.h rhi/command_stream.h rhi/device.h
   rhi/format.h rhi/handle.h
   rhi/pipeline.h rhi/pipeline_reloader.h rhi/reflection.h rhi/resources.h rhi/shader_compiler.h rhi/texture_table.h
@@ -32,8 +32,11 @@ set(public_headers
   materials/closures/blending.glsl materials/closures/operators.glsl materials/closures/table_buffers.glsl
   materials/closures/octahedral.glsl materials/closures/stored_fields.glsl materials/closures/stored_frame.glsl
   materials/closures/table_textures.glsl materials/storage_shader.h
-  materials/closures/thin_film.glsl materials/builtin_materials.h materials/description_tree.h materials/evaluation.h
-  materials/custom_material.h materials/layering_error.h materials/material_blob.h materials/random_walk.h materials/reference_stacks.h
+  materials/closures/conversions.glsl materials/closures/medium_inputs.glsl
+  materials/closures/specular_tables.glsl materials/specular_table.h
+  materials/closures/thin_film.glsl materials/building_blocks.h materials/builtin_materials.h materials/conversions.h
+  materials/custom_material.h materials/description_tree.h materials/evaluation.h materials/layering_error.h
+  materials/material_blob.h materials/random_walk.h materials/reference_stacks.h
   materials/preview.h materials/simplification.h materials/storage.h materials/topology.h materials/tree.h
   materials/tree_json.h materials/tree_shader.h
   scene/builtin.h scene/environment.h scene/load.h scene/scene.h scene/shapes.h scene/tangents.h

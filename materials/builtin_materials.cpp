@@ -10,6 +10,9 @@
 #include <limits>
 #include <numbers>
 
+#include "materials/building_blocks.h"
+#include "materials/conversions.h"
+
 namespace nacre::materials {
 namespace {
 
@@ -37,10 +40,7 @@ Slab metal(const glm::vec3& f0, float roughness) {
 Slab coat(const glm::vec3& transmittance, float roughness) {
     Slab slab = dielectric(black, roughness);
     slab.features = slab_medium;
-    for (int channel = 0; channel < 3; ++channel) {
-        slab.mean_free_path[channel] = transmittance[channel] >= 1.0f ? std::numeric_limits<float>::infinity()
-                                                                      : -1e-3f / std::log(transmittance[channel]);
-    }
+    slab.mean_free_path = transmittance_to_mean_free_path(transmittance, 1e-3f);
     slab.thickness = 1e-3f;
     return slab;
 }
@@ -171,6 +171,21 @@ Tree dusty_car_paint() {
     return tree;
 }
 
+// One of each building block (materials/building_blocks.h).
+template <typename Block>
+Tree block_of(const Block& block) {
+    Tree tree;
+    add(tree, block);
+    return tree;
+}
+
+Tree coated_layer() {
+    Tree tree;
+    const NodeIndex base = add(tree, DefaultLit{.base_color = aluminum, .metallic = 1.0f, .roughness = 0.35f, .anisotropy = 0.8f});
+    add(tree, CoatedLayer{.coat_color = {0.9f, 0.25f, 0.08f}, .coat_roughness = 0.08f}, base);
+    return tree;
+}
+
 struct Entry {
     BuiltinMaterial material;
     Tree (*make)();
@@ -194,6 +209,52 @@ const Entry entries[] = {
     {{"wet-skin", "subsurface scattering under a coat"}, coated_skin},
     {{"coated-carbon", "carbon fiber and metal under a colored coat"}, coated_carbon},
     {{"dusty-car-paint", "dust over a clear coat over metal"}, dusty_car_paint},
+    {{"default-lit", "block: half metal, half dielectric, in one slab"},
+     [] { return block_of(DefaultLit{.base_color = {{0.8f, 0.35f, 0.12f}}, .metallic = 0.5f, .roughness = 0.35f}); }},
+    {{"unlit", "block: light of its own"},
+     [] { return block_of(Unlit{.emission = {{0.9f, 0.5f, 0.1f}}}); }},
+    {{"coated-layer", "block: brushed metal under a colored layer"}, coated_layer},
+    {{"clear-coat", "block: metallic paint under a clear coat"},
+     [] {
+         return block_of(ClearCoat{
+             .base = {.base_color = {{0.03f, 0.12f, 0.45f}}, .metallic = 0.7f, .roughness = 0.45f},
+             .clear_coat_roughness = 0.03f});
+     }},
+    {{"cloth", "block: blue velvet"},
+     [] {
+         return block_of(Cloth{.base_color = {{0.02f, 0.03f, 0.2f}},
+                               .fuzz_color = {{0.35f, 0.45f, 0.9f}},
+                               .fuzz_roughness = 0.35f});
+     }},
+    {{"standard-surface-opaque", "block: wax, translucent, coated, dusty"},
+     [] {
+         return block_of(StandardSurface{.base_color = {{0.8f, 0.45f, 0.1f}},
+                                         .specular_roughness = 0.4f,
+                                         .subsurface_weight = 0.7f,
+                                         .subsurface_color = {{0.9f, 0.55f, 0.15f}},
+                                         .subsurface_radius = 0.004f,
+                                         .coat_weight = 0.6f,
+                                         .coat_roughness = 0.1f,
+                                         .fuzz_weight = 0.2f});
+     }},
+    {{"standard-surface-translucent", "block: green glass"},
+     [] {
+         return block_of(StandardSurface{.specular_roughness = 0.05f,
+                                         .transmission_weight = 1.0f,
+                                         .transmission_color = {0.3f, 0.8f, 0.45f},
+                                         .transmission_depth = 0.01f,
+                                         .geometry_thickness = 0.01f});
+     }},
+    {{"principled", "block: stretched, coated, with sheen"},
+     [] {
+         return block_of(Principled{.base_color = {{0.05f, 0.4f, 0.35f}},
+                                    .metallic = 0.3f,
+                                    .roughness = 0.4f,
+                                    .anisotropic = 0.7f,
+                                    .sheen = 0.4f,
+                                    .clearcoat = 0.5f,
+                                    .clearcoat_roughness = 0.05f});
+     }},
 };
 
 const auto listed = [] {

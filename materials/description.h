@@ -93,7 +93,7 @@ struct Transmission {
 
 /// KHR_materials_volume: what lies below a transmissive surface.
 struct Volume {
-    float thickness = 0.0f;              ///< Meters in the mesh's own space; 0: thin-walled.
+    float thickness = 0.0f;              ///< Meters in the world; 0: thin-walled.
     TextureReference thickness_texture;  ///< Channel g scales thickness.
     float attenuation_distance = std::numeric_limits<float>::infinity();  ///< Meters; see attenuation_color.
     glm::vec3 attenuation_color{1.0f};  ///< Color of white light after attenuation_distance.

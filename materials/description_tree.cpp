@@ -4,25 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
-#include <limits>
+
+#include "materials/building_blocks.h"
+#include "materials/conversions.h"
 
 namespace nacre::materials {
 namespace {
 
-constexpr float infinity = std::numeric_limits<float>::infinity();
-
 float unit(float value) { return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : 0.0f; }
 glm::vec3 unit(const glm::vec3& value) { return {unit(value.x), unit(value.y), unit(value.z)}; }
-
-// Distance after which white light has become `color`, as a mean free path: -d / ln(color) (Beer-Lambert).
-glm::vec3 mean_free_path_of(const glm::vec3& color, float distance) {
-    glm::vec3 result;
-    for (int channel = 0; channel < 3; ++channel) {
-        const float c = color[channel];
-        result[channel] = c >= 1.0f || !(distance < infinity) ? infinity : c <= 0.0f ? 0.0f : -distance / std::log(c);
-    }
-    return result;
-}
 
 class Builder {
   public:
@@ -40,12 +30,11 @@ class Builder {
         NodeIndex root = base();
         root = with_transmission(root);
         root = with_coat(root);
-        if (material_.alpha_mode != AlphaMode::opaque) {
-            const auto& texture = alpha_texture();
-            if (alpha() < 1.0f || texture.present()) {
-                root = tree_.coverage(root, alpha());
-                if (texture.present()) texture_on(root, {.field = "amount", .texture = texture, .channel = 3});
-            }
+        // A mask is there or not, which whoever draws it decides.
+        if (material_.alpha_mode == AlphaMode::blend) {
+            root = tree_.coverage(root, alpha());
+            texture_on(root, {.field = "amount", .texture = alpha_texture(), .channel = 3});
+            color_by_vertex(root, "amount");
         }
         tree_.root = root;
         for (Node& node : tree_.nodes) node.slab = clamped(node.slab);
@@ -57,6 +46,9 @@ class Builder {
         if (input.texture.present()) tree_.nodes[node].textures.push_back(std::move(input));
     }
 
+    // COLOR_0 of a mesh multiplies the base color.
+    void color_by_vertex(NodeIndex node, const char* field) { tree_.nodes[node].vertex_colored.emplace_back(field); }
+
     float alpha() const {
         return unit(material_.specular_glossiness ? material_.specular_glossiness->diffuse.a : material_.base_color.a);
     }
@@ -67,11 +59,8 @@ class Builder {
     glm::vec3 base_color() const { return unit(glm::vec3(material_.base_color)); }
 
     Tree unlit() {
-        Slab slab{.f0 = glm::vec3(0.0f), .albedo = glm::vec3(0.0f)};
-        slab.features = slab_emission;
-        slab.emission = base_color();
-        const NodeIndex node = tree_.add(slab, "unlit");
-        texture_on(node, {.field = "emission", .texture = material_.base_color_texture});
+        color_by_vertex(
+            materials::add(tree_, Unlit{.emission = {base_color(), {.texture = material_.base_color_texture}}}), "emission");
         return std::move(tree_);
     }
 
@@ -81,10 +70,11 @@ class Builder {
         slab.roughness = unit(material_.roughness);
         if (material_.anisotropy && material_.anisotropy->strength != 0.0f) {
             const float strength = unit(material_.anisotropy->strength), across = slab.roughness * slab.roughness;
-            const float along = across + (1.0f - across) * strength * strength;
+            const StretchedRoughness stretched =
+                alphas_to_roughness(across + (1.0f - across) * strength * strength, across);
             slab.features |= slab_anisotropy;
-            slab.roughness = std::sqrt(0.5f * (along + across));
-            slab.anisotropy = along + across > 0.0f ? (along - across) / (along + across) : 0.0f;
+            slab.roughness = stretched.roughness;
+            slab.anisotropy = stretched.anisotropy;
         }
         if (material_.sheen) {
             const glm::vec3 color = unit(material_.sheen->color);
@@ -147,8 +137,7 @@ class Builder {
     Slab dielectric() const {
         Slab slab = common();
         slab.albedo = base_color();
-        const float root = material_.ior == 0.0f ? 1.0f : (material_.ior - 1.0f) / (material_.ior + 1.0f);
-        slab.f0 = glm::vec3(root * root);
+        slab.f0 = glm::vec3(ior_to_f0(std::isfinite(material_.ior) ? material_.ior : 1.5f));
         if (material_.specular) slab.f0 = unit(slab.f0 * material_.specular->color) * unit(material_.specular->factor);
         return slab;
     }
@@ -156,6 +145,7 @@ class Builder {
     NodeIndex add_dielectric(const Slab& slab, const char* name) {
         const NodeIndex node = add(slab, name);
         texture_on(node, {.field = "albedo", .texture = material_.base_color_texture});
+        if (slab.albedo != glm::vec3(0.0f)) color_by_vertex(node, "albedo");
         if (material_.specular) {
             texture_on(node, {.field = "f0", .texture = material_.specular->color_texture});
         }
@@ -171,6 +161,7 @@ class Builder {
             slab.roughness = 1.0f - unit(material_.specular_glossiness->glossiness);
             const NodeIndex node = add(slab, "specular-glossiness");
             texture_on(node, {.field = "albedo", .texture = material_.specular_glossiness->diffuse_texture});
+            color_by_vertex(node, "albedo");
             texture_on(node, {.field = "f0", .texture = material_.specular_glossiness->specular_glossiness_texture});
             return node;
         }
@@ -183,6 +174,7 @@ class Builder {
         const auto add_metal = [&] {
             const NodeIndex node = add(metal, "metal");
             texture_on(node, {.field = "f0", .texture = material_.base_color_texture});
+            color_by_vertex(node, "f0");
             return node;
         };
         if (metallic >= 1.0f && !has_texture) return add_metal();
@@ -202,12 +194,12 @@ class Builder {
             glass.albedo = glm::vec3(0.0f);
             if (material_.volume && material_.volume->thickness > 0.0f) {
                 glass.thickness = material_.volume->thickness;
-                glass.mean_free_path = mean_free_path_of(unit(material_.volume->attenuation_color),
-                                                         material_.volume->attenuation_distance);
+                glass.mean_free_path = transmittance_to_mean_free_path(unit(material_.volume->attenuation_color),
+                                                                       material_.volume->attenuation_distance);
             } else {
                 tree_.thin = true;
                 glass.thickness = tree_.surface_thickness;
-                glass.mean_free_path = mean_free_path_of(base_color(), tree_.surface_thickness);
+                glass.mean_free_path = transmittance_to_mean_free_path(base_color(), tree_.surface_thickness);
             }
             const NodeIndex node = add(glass, "transmissive");
             if (material_.volume && material_.volume->thickness > 0.0f) {
@@ -233,21 +225,13 @@ class Builder {
 
     NodeIndex with_coat(NodeIndex root) {
         if (!material_.clearcoat || !(material_.clearcoat->factor > 0.0f)) return root;
-        Slab coat;
-        coat.features = slab_medium;
-        coat.mean_free_path = glm::vec3(infinity);
-        coat.thickness = 1e-4f;
-        coat.albedo = glm::vec3(0.0f);
-        coat.roughness = unit(material_.clearcoat->roughness);
-        const std::uint32_t frame = tree_.add_frame({.normal_texture = material_.clearcoat->normal_texture});
-        NodeIndex top = tree_.add(coat, "clear coat", frame);
-        texture_on(top, {.field = "roughness", .texture = material_.clearcoat->roughness_texture, .channel = 1});
-        const float factor = unit(material_.clearcoat->factor);
-        if (factor < 1.0f || material_.clearcoat->texture.present()) {
-            top = tree_.coverage(top, factor);
-            texture_on(top, {.field = "amount", .texture = material_.clearcoat->texture});
-        }
-        return tree_.layer(top, root);
+        const Clearcoat& coat = *material_.clearcoat;
+        return materials::add(
+            tree_,
+            CoatedLayer{.coat = {unit(coat.factor), {.texture = coat.texture}},
+                        .coat_roughness = {unit(coat.roughness), {.texture = coat.roughness_texture, .channel = 1}},
+                        .coat_frame = tree_.add_frame({.normal_texture = coat.normal_texture})},
+            root);
     }
 
     const MaterialDescription& material_;

@@ -17,7 +17,8 @@ namespace nacre::materials {
 /// it: sheen is fuzz, anisotropy is converted by widths (alpha along the tangent is mix(alpha, 1, strength^2), across
 /// it alpha: Kulla-Conty's roughness and anisotropy with the same two widths), iridescence is a thin film, transmission
 /// mixes in a slab with a medium (of the volume, or thin and tinted by the base color), emission leaves below the coat,
-/// a clear coat lies above with normals of its own, alpha is coverage.
+/// a clear coat lies above with normals of its own, the alpha of blended materials is
+/// coverage, vertex colors multiply the base color.
 ///
 /// What glTF has and slabs do not: reflection that fades at grazing angles (KHR_materials_specular with a factor below
 /// 1 darkens F0 only, and its strength texture is not read), dispersion, occlusion (the renderer's). Textures of

@@ -33,6 +33,10 @@ bool is_white(const glm::dvec3& color) { return glm::all(glm::greaterThan(color,
 }  // namespace
 
 ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footprint) {
+    return shade(tree, view, footprint, library);
+}
+
+ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footprint, Library& library) {
     const Topology& topology = tree.topology;
     std::vector<Library::Slab> slabs(topology.slab_registers);
     std::vector<Library::Matter> matters(topology.matter_registers);

@@ -34,7 +34,10 @@ struct ShadedTree {
 };
 
 /// Prepares all closures. `view`: unit, z > 0. `footprint`: meters that a pixel covers, as prepare_closure() takes it.
+/// Tints by specular tables count as white, or are those of `library`.
 [[nodiscard]] ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footprint = 1e-3);
+[[nodiscard]] ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footprint,
+                               closures::Library& library);
 
 /// Radiance towards the view under light of radiance 1 per steradian from `light` (unit, z > 0), cosine included;
 /// mirrors do not show.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "materials/evaluation.h"
+#include "materials/specular_table.h"
 
 namespace nacre::materials {
 namespace {
@@ -78,6 +79,8 @@ struct SoftBox {
 
 const SoftBox soft_box;
 
+const auto tints = tints_of(default_specular_tables());
+
 glm::dvec3 ambient_sky(const glm::dvec3& direction) {
     const double up = direction.y;
     return up < 0.0 ? glm::mix(glm::dvec3(0.45, 0.42, 0.40), glm::dvec3(0.10, 0.09, 0.08), smooth(0.1, 0.4, -up))
@@ -88,6 +91,7 @@ glm::dvec3 ambient_sky(const glm::dvec3& direction) {
 // (Veach 1997, the balance heuristic).
 glm::dvec3 radiance_of(const ShadedClosure& c, const Frame& frame, std::uint32_t x, std::uint32_t y, int strata) {
     Library library;
+    library.tints = tints;
     const double count = strata * strata;
     constexpr double box_count = box_strata * box_strata;
     glm::dvec3 sum(0.0);
@@ -121,8 +125,9 @@ glm::dvec3 radiance_of(const ShadedClosure& c, const Frame& frame, std::uint32_t
 glm::dvec3 radiance(const FlattenedTree& tree, const glm::dvec3& normal, double footprint, std::uint32_t x,
                     std::uint32_t y, int strata) {
     Library library;
+    library.tints = tints;
     const Frame frame = frame_at(normal);
-    const ShadedTree shaded = shade(tree, frame.to_local({0, 0, 1}), footprint);
+    const ShadedTree shaded = shade(tree, frame.to_local({0, 0, 1}), footprint, library);
     glm::dvec3 sum(0.0);
     for (const ShadedClosure& c : shaded.closures) {
         glm::dvec3 sent = radiance_of(c, frame, x, y, strata);

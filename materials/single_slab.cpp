@@ -5,6 +5,8 @@
 #include <cmath>
 #include <glm/common.hpp>
 
+#include "materials/conversions.h"
+
 namespace nacre::materials {
 namespace {
 
@@ -15,13 +17,6 @@ float clamp_finite(float value, float low, float high, float fallback) {
 glm::vec3 clamp_finite(const glm::vec3& value, float low, float high, float fallback) {
     return {clamp_finite(value.x, low, high, fallback), clamp_finite(value.y, low, high, fallback),
             clamp_finite(value.z, low, high, fallback)};
-}
-
-float f0_of_ior(float ior) {
-    if (ior == 0.0f) return 1.0f;
-    const float valid_ior = clamp_finite(ior, 1.0f, 1e4f, 1.5f);
-    const float ratio = (valid_ior - 1.0f) / (valid_ior + 1.0f);
-    return ratio * ratio;
 }
 
 }  // namespace
@@ -35,7 +30,7 @@ SingleSlab single_slab(const MaterialDescription& material) {
     slab.roughness = clamp_finite(material.roughness, 0.0f, 1.0f, 1.0f);
     slab.metallic_roughness_texture = material.metallic_roughness_texture;
 
-    slab.f0 = glm::vec3(f0_of_ior(material.ior));
+    slab.f0 = glm::vec3(ior_to_f0(std::isfinite(material.ior) ? material.ior : 1.5f));
     if (const auto& specular = material.specular) {
         const float factor = clamp_finite(specular->factor, 0.0f, 1.0f, 1.0f);
         const glm::vec3 tint = clamp_finite(specular->color, 0.0f, 1e4f, 1.0f);

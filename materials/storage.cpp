@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 namespace nacre::materials {
@@ -296,34 +295,6 @@ glm::dvec3 dither_of_color(glm::uvec2 position, std::uint32_t which) {
             library.ordered_dither(position.x, position.y, which + 2)};
 }
 
-// As octahedral_encode() and octahedral_decode() of materials/closures/octahedral.glsl.
-std::uint32_t encode_direction(const glm::dvec3& n, std::uint32_t bits) {
-    const double sum = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
-    double x = n.x / sum, y = n.y / sum;
-    if (n.z < 0.0) {
-        const double folded = 1.0 - std::abs(y);
-        y = std::copysign(1.0 - std::abs(x), y);
-        x = std::copysign(folded, x);
-    }
-    const double half_range = (1u << (bits / 2 - 1)) - 1.0;
-    const auto code = [&](double v) {
-        return static_cast<std::uint32_t>(std::floor(std::clamp(v, -1.0, 1.0) * half_range + 0.5) + half_range);
-    };
-    return code(x) | code(y) << (bits / 2);
-}
-
-glm::dvec3 decode_direction(std::uint32_t code, std::uint32_t bits) {
-    const double half_range = (1u << (bits / 2 - 1)) - 1.0;
-    const std::uint32_t mask = (1u << (bits / 2)) - 1u;
-    double x = ((code & mask) - half_range) / half_range, y = ((code >> (bits / 2) & mask) - half_range) / half_range;
-    const double z = 1.0 - std::abs(x) - std::abs(y), fold = std::max(-z, 0.0);
-    x += x >= 0.0 ? -fold : fold;
-    y += y >= 0.0 ? -fold : fold;
-    return glm::normalize(glm::dvec3(x, y, z));
-}
-
-constexpr double shortest_path = 1e-6, longest_path = 10.0, longest_thickness = 1e3;
-
 }  // namespace
 
 std::string_view name_of(StorageClass storage_class) {
@@ -349,18 +320,7 @@ StorageLayout storage_layout(const FlattenedTree& tree, const StorageOptions& op
 }
 
 std::uint32_t pack_subsurface(const Library::Slab& slab, glm::uvec2 position) {
-    std::uint32_t word = 0;
-    for (int channel = 0; channel < 3; ++channel) {
-        const double similarity = library.medium_similarity(slab.albedo[channel], 1.0 - slab.albedo[channel]);
-        const double isotropic = slab.mean_free_path[channel] *
-                                 (1.0 - slab.phase_anisotropy * similarity * similarity) / (1.0 - slab.phase_anisotropy);
-        word |= library.pack_logarithm(isotropic, 8, shortest_path, std::log2(longest_path / shortest_path),
-                                       library.ordered_dither(position.x, position.y, static_cast<std::uint32_t>(channel)))
-                << (8 * channel);
-    }
-    return word | library.pack_logarithm(slab.thickness, 8, shortest_path,
-                                         std::log2(longest_thickness / shortest_path), 0.5)
-                      << 24;
+    return library.pack_subsurface(slab.albedo, slab.mean_free_path, slab.phase_anisotropy, slab.thickness, position);
 }
 
 StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, const PixelInputs& inputs) {
@@ -400,8 +360,9 @@ StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, co
                 break;
             case StorageValue::occlusion: code = encode_number(format, field.bits, inputs.occlusion, 0.5); break;
             case StorageValue::normal:
-                code = encode_direction(field.frame < inputs.normals.size() ? inputs.normals[field.frame] : glm::dvec3(0, 0, 1),
-                                        field.bits);
+                code = library.octahedral_encode(
+                    field.frame < inputs.normals.size() ? inputs.normals[field.frame] : glm::dvec3(0, 0, 1),
+                    static_cast<int>(field.bits / 2));
                 break;
             case StorageValue::tangent:
                 code = encode_number(format, field.bits,
@@ -492,8 +453,8 @@ Expected<UnpackedMaterial> unpack_pixel(const StoredPixel& pixel) {
     }
     for (frame = 0; frame < frames; ++frame) {
         if (frame > 0) {
-            const std::uint32_t bits = storage_format(StorageValue::normal).bits;
-            material.normals.push_back(decode_direction(read(StorageValue::normal), bits));
+            const auto bits = static_cast<int>(storage_format(StorageValue::normal).bits / 2);
+            material.normals.push_back(library.octahedral_decode(read(StorageValue::normal), bits));
         }
         const StorageFormat& format = storage_format(StorageValue::tangent);
         material.tangent_angles.push_back((tangents >> frame & 1u) != 0
@@ -548,15 +509,8 @@ Expected<UnpackedMaterial> unpack_pixel(const StoredPixel& pixel) {
             result.slab.thickness = 1.0;
         }
         if (medium == StoredMedium::subsurface) {
-            for (int channel = 0; channel < 3; ++channel) {
-                result.slab.mean_free_path[channel] =
-                    library.unpack_logarithm(pixel.subsurface >> (8 * channel) & 0xffu, 8, shortest_path,
-                                             std::log2(longest_path / shortest_path));
-            }
-            const std::uint32_t thickness = pixel.subsurface >> 24;
-            result.slab.thickness = thickness == 255 ? std::numeric_limits<double>::infinity()
-                                                     : library.unpack_logarithm(thickness, 8, shortest_path,
-                                                                                std::log2(longest_thickness / shortest_path));
+            result.slab.mean_free_path = library.unpack_mean_free_path(pixel.subsurface);
+            result.slab.thickness = library.unpack_thickness(pixel.subsurface);
         }
         material.closures.push_back(result);
     }

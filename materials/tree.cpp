@@ -73,6 +73,21 @@ int child_count(const Node& node) {
     return 0;
 }
 
+Expected<void> check_vertex_colors(const Tree& tree, NodeIndex index) {
+    const Node& node = tree.nodes[index];
+    for (const std::string& name : node.vertex_colored) {
+        const SlabField* field = node.kind == NodeKind::slab ? find_slab_field(name) : nullptr;
+        const bool is_color = field != nullptr && field->channels == 3 &&
+                              (field->feature == 0 || (node.slab.features & field->feature) != 0);
+        const bool is_amount = name == "amount" && (node.kind == NodeKind::mix || node.kind == NodeKind::coverage);
+        if (!is_color && !is_amount) {
+            return refuse(tree, place_of(tree, index), fmt::format("vertex colors are on '{}'", name),
+                          "They multiply colors that the slab has, and amounts of mix and coverage.");
+        }
+    }
+    return {};
+}
+
 // NaN is in no range.
 bool in_range(float value, float minimum, float maximum) { return value >= minimum && value <= maximum; }
 
@@ -120,7 +135,7 @@ Expected<void> check_textures(const Tree& tree, NodeIndex index) {
                               fmt::format("a texture is on '{}', whose feature the slab does not have", input.field),
                               "Set the feature's bit or remove the texture.");
             }
-            channels = field->channels;
+            channels = input.gray ? 1 : field->channels;
         } else if (input.field != "amount" || node.kind == NodeKind::layer) {
             return refuse(
                 tree, place_of(tree, index),
@@ -147,23 +162,19 @@ Expected<void> check_textures(const Tree& tree, NodeIndex index) {
     return {};
 }
 
-bool has_texture(const Node& node, std::string_view field) {
-    return std::ranges::any_of(node.textures, [&](const TextureInput& input) { return input.field == field; });
-}
-
 // Whether nothing below the subtree can ever be seen.
 bool hides_what_is_below(const Tree& tree, NodeIndex index) {
     const Node& node = tree.nodes[index];
     switch (node.kind) {
         case NodeKind::slab: {
-            const bool covers = node.slab.coverage >= 1.0f && !has_texture(node, "coverage") &&
+            const bool covers = node.slab.coverage >= 1.0f && !node.varies("coverage") &&
                                 (node.slab.features & slab_edge_coverage) == 0;
             return covers && (node.slab.features & slab_medium) == 0;
         }
         case NodeKind::mix: return hides_what_is_below(tree, node.first) && hides_what_is_below(tree, node.second);
         case NodeKind::layer: return hides_what_is_below(tree, node.first) || hides_what_is_below(tree, node.second);
         case NodeKind::coverage:
-            return node.amount >= 1.0f && !has_texture(node, "amount") && hides_what_is_below(tree, node.first);
+            return node.amount >= 1.0f && !node.varies("amount") && hides_what_is_below(tree, node.first);
     }
     return false;
 }
@@ -171,7 +182,7 @@ bool hides_what_is_below(const Tree& tree, NodeIndex index) {
 // Which node stands for `index` once what is invisible is gone; `tree` is changed where a child moves up.
 NodeIndex visible(Tree& tree, NodeIndex index) {
     Node& node = tree.nodes[index];
-    const bool is_fixed = !has_texture(node, "amount");
+    const bool is_fixed = !node.varies("amount");
     switch (node.kind) {
         case NodeKind::slab: return index;
         case NodeKind::coverage:
@@ -189,9 +200,9 @@ NodeIndex visible(Tree& tree, NodeIndex index) {
             node.second = visible(tree, node.second);
             const auto is_absent = [&](NodeIndex child) {
                 const Node& n = tree.nodes[child];
-                if (n.kind == NodeKind::coverage) return n.amount <= 0.0f && !has_texture(n, "amount");
+                if (n.kind == NodeKind::coverage) return n.amount <= 0.0f && !n.varies("amount");
                 // The view-dependent coverage of a slab with coverage 0 may still be more at grazing angles.
-                return n.kind == NodeKind::slab && n.slab.coverage <= 0.0f && !has_texture(n, "coverage") &&
+                return n.kind == NodeKind::slab && n.slab.coverage <= 0.0f && !n.varies("coverage") &&
                        (n.slab.features & slab_edge_coverage) == 0;
             };
             if (is_absent(node.first)) return node.second;
@@ -205,6 +216,11 @@ NodeIndex visible(Tree& tree, NodeIndex index) {
 }
 
 }  // namespace
+
+bool Node::varies(std::string_view field) const {
+    return std::ranges::find(textures, field, &TextureInput::field) != textures.end() ||
+           std::ranges::find(vertex_colored, field) != vertex_colored.end();
+}
 
 std::string_view name_of(NodeKind kind) {
     switch (kind) {
@@ -277,6 +293,7 @@ Expected<void> validate(const Tree& tree) {
         seen[step.node] = true;
         const Node& node = tree.nodes[step.node];
         NACRE_CHECK(check_textures(tree, step.node));
+        NACRE_CHECK(check_vertex_colors(tree, step.node));
         if (node.kind == NodeKind::slab) {
             NACRE_CHECK(check_slab(tree, step.node));
             if (++slabs > max_tree_slabs) {

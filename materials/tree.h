@@ -34,6 +34,7 @@ struct TextureInput {
     std::uint32_t channel = 0;  ///< First channel that is read, 0 (r) to 3 (a); colors read three from 0.
     float scale = 1.0f;
     float bias = 0.0f;
+    bool gray = false;  ///< Colors: `channel` alone counts, for all three.
 
     bool operator==(const TextureInput&) const = default;
 };
@@ -72,6 +73,12 @@ struct Node {
     bool parameter_blend = false;  ///< Mix and layer: always simplified to one slab, whatever the budget.
 
     std::vector<TextureInput> textures;  ///< At most one for each input.
+    /// Inputs that the color of the vertex multiplies: colors of a slab by its rgb, "amount" by its alpha. White where a
+    /// mesh has none.
+    std::vector<std::string> vertex_colored;
+
+    /// Whether an input is more than its number: a texture or the vertex's color multiplies it.
+    [[nodiscard]] bool varies(std::string_view field) const;
 };
 
 /// See the top of this file. Plain data; distinct trees may be used by distinct threads.

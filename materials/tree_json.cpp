@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "core/file.h"
+#include "core/text_position.h"
+#include "materials/building_blocks.h"
 
 namespace nacre::materials {
 namespace {
@@ -21,6 +23,7 @@ using json = nlohmann::ordered_json;
 constexpr std::uint64_t largest_file = std::uint64_t{16} << 20;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr std::string_view channel_names = "rgba";
+constexpr std::size_t specular_lut_count = 256;  // stored in 8 bits
 
 class Reader {
   public:
@@ -35,10 +38,7 @@ class Reader {
         }
         MaterialFile result;
         if (document.contains("name")) NACRE_CHECK(text(document["name"], "name", result.tree.name));
-        if (document.contains("thin")) {
-            if (!document["thin"].is_boolean()) return refuse("thin", "it is no boolean", "Write true or false.");
-            result.tree.thin = document["thin"];
-        }
+        if (document.contains("thin")) NACRE_CHECK(boolean(document["thin"], "thin", result.tree.thin));
         if (document.contains("surface_thickness"))
             NACRE_CHECK(number(document["surface_thickness"], "surface_thickness", result.tree.surface_thickness));
         if (document.contains("images")) {
@@ -100,6 +100,13 @@ class Reader {
         if (!value.is_string())
             return refuse(place, fmt::format("it is a {}, not a text", value.type_name()), "Write \"...\".");
         result = value.get<std::string>();
+        return {};
+    }
+
+    Expected<void> boolean(const json& value, std::string_view place, bool& result) const {
+        if (!value.is_boolean())
+            return refuse(place, fmt::format("it is a {}, not a boolean", value.type_name()), "Write true or false.");
+        result = value;
         return {};
     }
 
@@ -177,14 +184,18 @@ class Reader {
                          Node& owner, Set&& set) const {
         const json* constant = &value;
         if (value.is_object()) {
-            NACRE_CHECK(members(value, place, {"value", "texture"}));
+            NACRE_CHECK(members(value, place, {"value", "texture", "vertex_color"}));
+            bool colored = false;
+            if (value.contains("vertex_color"))
+                NACRE_CHECK(boolean(value["vertex_color"], place + ".vertex_color", colored));
+            if (colored) owner.vertex_colored.emplace_back(field);
             constant = value.contains("value") ? &value["value"] : nullptr;
             if (value.contains("texture")) {
                 const json& texture = value["texture"];
                 const std::string at = place + ".texture";
                 NACRE_CHECK(
                     members(texture, at,
-                            {"image", "uv_set", "uv_offset", "uv_scale", "uv_rotation", "channel", "scale", "bias"}));
+                            {"image", "uv_set", "uv_offset", "uv_scale", "uv_rotation", "channel", "scale", "bias", "gray"}));
                 TextureInput read{.field = std::string(field)};
                 NACRE_CHECK(reference(texture, at, read.texture));
                 if (texture.contains("channel")) {
@@ -197,6 +208,7 @@ class Reader {
                 }
                 if (texture.contains("scale")) NACRE_CHECK(number(texture["scale"], at + ".scale", read.scale));
                 if (texture.contains("bias")) NACRE_CHECK(number(texture["bias"], at + ".bias", read.bias));
+                if (texture.contains("gray")) NACRE_CHECK(boolean(texture["gray"], at + ".gray", read.gray));
                 owner.textures.push_back(read);
             }
             if (constant == nullptr) return {};
@@ -221,7 +233,7 @@ class Reader {
     }
 
     Expected<NodeIndex> slab(const json& value, const std::string& place, Tree& tree) const {
-        std::vector<std::string_view> known{"name", "frame", "features"};
+        std::vector<std::string_view> known{"name", "frame", "features", "specular_lut"};
         for (const SlabField& field : slab_fields()) known.emplace_back(field.name);
         NACRE_CHECK(members(value, place, known));
         Node read;
@@ -248,6 +260,12 @@ class Reader {
                 }
             }
         }
+        if (value.contains("specular_lut")) {
+            int table = 0;
+            NACRE_CHECK(index(value["specular_lut"], place + ".specular_lut", specular_lut_count, table));
+            read.slab.features |= slab_specular_lut;
+            read.slab.specular_lut = static_cast<std::uint32_t>(table);
+        }
         for (const SlabField& field : slab_fields()) {
             if (!value.contains(field.name)) continue;
             read.slab.features |= field.feature;
@@ -259,11 +277,62 @@ class Reader {
         return static_cast<NodeIndex>(tree.nodes.size() - 1);
     }
 
+    Expected<void> range(float value, float minimum, float maximum, std::string_view place) const {
+        if (value >= minimum && value <= maximum) return {};
+        return refuse(place, fmt::format("it is {}", value), fmt::format("It must be in [{}, {}].", minimum, maximum));
+    }
+
+    Expected<NodeIndex> block(const BuildingBlock& kind, const json& value, const std::string& place,
+                              std::uint32_t depth, Tree& tree) const {
+        std::vector<std::string_view> known{"name"};
+        if (kind.has_base) known.emplace_back("base");
+        for (const BlockInput& item : kind.inputs) known.emplace_back(item.name);
+        NACRE_CHECK(members(value, place, known));
+        std::vector<BlockValue> values = kind.defaults;
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            const BlockInput& item = kind.inputs[i];
+            const std::string name(item.name), at = place + "." + name;
+            if (!value.contains(name)) continue;
+            const json& given = value[name];
+            if (item.kind == BlockInputKind::frame) {
+                int frame = 0;
+                NACRE_CHECK(index(given, at, tree.frames.size(), frame));
+                values[i].frame = static_cast<std::uint32_t>(frame);
+                continue;
+            }
+            if (given.is_object() && given.contains("texture") && !item.takes_texture) {
+                return refuse(at, "it takes no texture: no input of a slab is in proportion to it",
+                              "Write a number, or build the material of slabs.");
+            }
+            if (given.is_object() && given.contains("vertex_color")) {
+                return refuse(at, "blocks have no vertex colors", "Leave it out, or build the material of slabs.");
+            }
+            const std::uint32_t channels = item.kind == BlockInputKind::color ? 3 : 1;
+            Node read;
+            NACRE_CHECK(input(given, at, name, channels, read, [&](std::uint32_t channel, float number) {
+                values[i].value[static_cast<int>(channel)] = number;
+            }));
+            for (std::uint32_t channel = 0; channel < channels; ++channel)
+                NACRE_CHECK(range(values[i].value[static_cast<int>(channel)], item.minimum, item.maximum, at));
+            if (!read.textures.empty()) values[i].texture = read.textures.front();
+        }
+        NodeIndex base = 0;
+        if (kind.has_base) {
+            if (!value.contains("base")) return refuse(place, "it has no 'base'", "Write the node there.");
+            NACRE_TRY(base, node(value["base"], place + ".base", depth + 1, tree));
+        }
+        const NodeIndex result = kind.add(tree, values, base);
+        if (value.contains("name")) NACRE_CHECK(text(value["name"], place + ".name", tree.nodes[result].name));
+        return result;
+    }
+
     Expected<NodeIndex> node(const json& value, const std::string& place, std::uint32_t depth, Tree& tree) const {
-        NACRE_CHECK(members(value, place, {"slab", "mix", "layer", "coverage"}));
+        std::vector<std::string_view> kinds{"slab", "mix", "layer", "coverage"};
+        for (const BuildingBlock& known : building_blocks()) kinds.emplace_back(known.name);
+        NACRE_CHECK(members(value, place, kinds));
         if (value.size() != 1) {
             return refuse(place, fmt::format("it has {} members", value.size()),
-                          "A node has one: slab, mix, layer or coverage.");
+                          fmt::format("A node has one: {}.", fmt::join(kinds, ", ")));
         }
         const std::string kind = value.begin().key();
         const json& body = value.begin().value();
@@ -273,6 +342,7 @@ class Reader {
             return refuse(place, fmt::format("more than {} operators lie above it", max_tree_depth),
                           "Arrange the operators in a flatter tree.");
         }
+        if (const BuildingBlock* known = find_building_block(kind)) return block(*known, body, at, depth, tree);
         Node read;
         const auto child = [&](const char* name) -> Expected<NodeIndex> {
             if (!body.contains(name)) return refuse(at, fmt::format("it has no '{}'", name), "Write the node there.");
@@ -300,11 +370,8 @@ class Reader {
             }
         }
         if (body.contains("name")) NACRE_CHECK(text(body["name"], at + ".name", read.name));
-        if (body.contains("parameter_blend")) {
-            if (!body["parameter_blend"].is_boolean())
-                return refuse(at + ".parameter_blend", "it is no boolean", "Write true or false.");
-            read.parameter_blend = body["parameter_blend"];
-        }
+        if (body.contains("parameter_blend"))
+            NACRE_CHECK(boolean(body["parameter_blend"], at + ".parameter_blend", read.parameter_blend));
         tree.nodes.push_back(std::move(read));
         return static_cast<NodeIndex>(tree.nodes.size() - 1);
     }
@@ -336,13 +403,20 @@ const TextureInput* texture_of(const Node& node, std::string_view field) {
     return found == node.textures.end() ? nullptr : &*found;
 }
 
-json with_texture(json constant, const TextureInput* input) {
-    if (input == nullptr) return constant;
-    json texture = reference_json(input->texture);
-    if (input->channel != 0) texture["channel"] = std::string(1, channel_names[input->channel]);
-    if (input->scale != 1.0f) texture["scale"] = number_json(input->scale);
-    if (input->bias != 0.0f) texture["bias"] = number_json(input->bias);
-    return json{{"value", std::move(constant)}, {"texture", std::move(texture)}};
+// The constant, or an object with what multiplies it.
+json input_json(json constant, const Node& node, std::string_view field) {
+    if (!node.varies(field)) return constant;
+    json result{{"value", std::move(constant)}};
+    if (const TextureInput* input = texture_of(node, field)) {
+        json texture = reference_json(input->texture);
+        if (input->channel != 0) texture["channel"] = std::string(1, channel_names[input->channel]);
+        if (input->scale != 1.0f) texture["scale"] = number_json(input->scale);
+        if (input->bias != 0.0f) texture["bias"] = number_json(input->bias);
+        if (input->gray) texture["gray"] = true;
+        result["texture"] = std::move(texture);
+    }
+    if (std::ranges::find(node.vertex_colored, field) != node.vertex_colored.end()) result["vertex_color"] = true;
+    return result;
 }
 
 json slab_json(const Node& node) {
@@ -351,11 +425,14 @@ json slab_json(const Node& node) {
     if (!node.name.empty()) result["name"] = node.name;
     if (node.frame != 0) result["frame"] = node.frame;
     std::uint32_t shown = 0;
+    if ((node.slab.features & slab_specular_lut) != 0 && node.slab.specular_lut != 0) {
+        result["specular_lut"] = node.slab.specular_lut;
+        shown |= slab_specular_lut;
+    }
     json fields = json::object();
     for (const SlabField& field : slab_fields()) {
         if (field.feature != 0 && (node.slab.features & field.feature) == 0) continue;
-        const TextureInput* texture = texture_of(node, field.name);
-        bool is_plain = texture == nullptr, is_gray = true;
+        bool is_plain = !node.varies(field.name), is_gray = true;
         for (std::uint32_t channel = 0; channel < field.channels; ++channel) {
             is_plain &= field.get(node.slab, channel) == field.get(plain, channel);
             is_gray &= field.get(node.slab, channel) == field.get(node.slab, 0);
@@ -368,7 +445,7 @@ json slab_json(const Node& node) {
             for (std::uint32_t channel = 0; channel < field.channels; ++channel)
                 constant.push_back(number_json(field.get(node.slab, channel)));
         }
-        fields[field.name] = with_texture(std::move(constant), texture);
+        fields[field.name] = input_json(std::move(constant), node, field.name);
     }
     json features = json::array();
     for (const SlabFeature& feature : slab_features()) {
@@ -388,7 +465,7 @@ json node_json(const Tree& tree, NodeIndex index) {
         case NodeKind::mix:
             body["first"] = node_json(tree, node.first);
             body["second"] = node_json(tree, node.second);
-            body["amount"] = with_texture(number_json(node.amount), texture_of(node, "amount"));
+            body["amount"] = input_json(number_json(node.amount), node, "amount");
             break;
         case NodeKind::layer:
             body["top"] = node_json(tree, node.first);
@@ -397,18 +474,12 @@ json node_json(const Tree& tree, NodeIndex index) {
             break;
         case NodeKind::coverage:
             body["of"] = node_json(tree, node.first);
-            body["amount"] = with_texture(number_json(node.amount), texture_of(node, "amount"));
+            body["amount"] = input_json(number_json(node.amount), node, "amount");
             break;
         case NodeKind::slab: break;
     }
     if (node.parameter_blend) body["parameter_blend"] = true;
     return json{{std::string(name_of(node.kind)), std::move(body)}};
-}
-
-json object_schema(json properties, json required = json::array()) {
-    json result{{"type", "object"}, {"properties", std::move(properties)}, {"additionalProperties", false}};
-    if (!required.empty()) result["required"] = std::move(required);
-    return result;
 }
 
 }  // namespace
@@ -419,11 +490,9 @@ Expected<MaterialFile> parse_material(std::string_view text, std::string_view so
     try {
         document = json::parse(text);
     } catch (const json::parse_error& error) {
-        const std::size_t at = std::min(error.byte > 0 ? error.byte - 1 : 0, text.size());
-        const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n') + 1;
-        const std::size_t line_start = text.substr(0, at).rfind('\n');
-        const std::size_t column = at - (line_start == std::string_view::npos ? 0 : line_start + 1) + 1;
-        return reader.refuse(fmt::format("line {}, column {}", line, column), "the text is no JSON",
+        // The parser counts bytes from 1.
+        const TextPosition at = text_position(text, error.byte > 0 ? error.byte - 1 : 0);
+        return reader.refuse(fmt::format("line {}, column {}", at.line, at.column), "the text is no JSON",
                              "See docs/materials.md for the format.");
     }
     return Reader(source).file(document);
@@ -458,80 +527,6 @@ std::string material_text(const MaterialFile& file) {
         }
     }
     result["root"] = node_json(file.tree, file.tree.root);
-    return result.dump(2) + "\n";
-}
-
-std::string material_schema() {
-    const json one{{"oneOf", {json{{"type", "number"}}, json{{"const", "infinity"}}}}};
-    json placement{
-        {"image", {{"type", "integer"}, {"minimum", 0}}},
-        {"uv_set", {{"enum", {0, 1}}}},
-        {"uv_offset", {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}}},
-        {"uv_scale", {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 2}, {"maxItems", 2}}},
-        {"uv_rotation", {{"type", "number"}, {"description", "radians"}}}};
-    json texture = placement, normal = placement;
-    texture.update(json{{"channel", {{"enum", {"r", "g", "b", "a"}}}},
-                        {"scale", {{"type", "number"}}},
-                        {"bias", {{"type", "number"}}}});
-    normal["strength"] = json{{"type", "number"}};
-    const json texture_ref{{"$ref", "#/$defs/texture"}};
-    const auto input = [&](json constant) {
-        json with = object_schema({{"value", constant}, {"texture", texture_ref}});
-        return json{{"oneOf", {std::move(constant), std::move(with)}}};
-    };
-    json slab{{"name", {{"type", "string"}}}, {"frame", {{"type", "integer"}, {"minimum", 0}}}};
-    json features = json::array();
-    for (const SlabFeature& feature : slab_features()) features.push_back(feature.name);
-    slab["features"] = json{{"type", "array"}, {"items", {{"enum", features}}}};
-    for (const SlabField& field : slab_fields()) {
-        json bounded{{"type", "number"}, {"minimum", field.minimum}};
-        if (std::isfinite(field.maximum)) bounded["maximum"] = field.maximum;
-        json number = std::isfinite(field.maximum) ? bounded : json{{"oneOf", {bounded, json{{"const", "infinity"}}}}};
-        if (field.channels == 1) {
-            slab[field.name] = input(number);
-        } else {
-            slab[field.name] = input(json{
-                {"oneOf", {number, json{{"type", "array"}, {"items", number}, {"minItems", 3}, {"maxItems", 3}}}}});
-        }
-    }
-    const json node{{"$ref", "#/$defs/node"}}, name{{"type", "string"}}, yes{{"type", "boolean"}};
-    const json amount = input(json{{"type", "number"}, {"minimum", 0}, {"maximum", 1}});
-    const auto only = [](const char* kind, json body) {
-        json result = object_schema(json::object(), json::array({kind}));
-        result["properties"][kind] = std::move(body);
-        return result;
-    };
-    json kinds = json::array();
-    kinds.push_back(only("slab", object_schema(std::move(slab))));
-    kinds.push_back(only(
-        "mix",
-        object_schema({{"name", name}, {"first", node}, {"second", node}, {"amount", amount}, {"parameter_blend", yes}},
-                      json::array({"first", "second", "amount"}))));
-    kinds.push_back(only(
-        "layer",
-        object_schema({{"name", name}, {"top", node}, {"base", node}, {"thickness", one}, {"parameter_blend", yes}},
-                      json::array({"top", "base"}))));
-    kinds.push_back(only(
-        "coverage", object_schema({{"name", name}, {"of", node}, {"amount", amount}}, json::array({"of", "amount"}))));
-    json schema = object_schema(
-        {{"$schema", {{"type", "string"}}},
-         {"nacre_material", {{"const", 1}}},
-         {"name", name},
-         {"thin", yes},
-         {"surface_thickness", one},
-         {"images", {{"type", "array"}, {"items", {{"type", "string"}}}}},
-         {"frames",
-          {{"type", "array"},
-           {"minItems", 1},
-           {"items", object_schema({{"normal", object_schema(std::move(normal), json::array({"image"}))},
-                                    {"rotation", {{"type", "number"}}},
-                                    {"rotation_texture", object_schema(placement, json::array({"image"}))}})}}},
-         {"root", node}},
-        json::array({"nacre_material", "root"}));
-    schema["$defs"] = json{{"node", {{"oneOf", std::move(kinds)}}},
-                           {"texture", object_schema(std::move(texture), json::array({"image"}))}};
-    json result{{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", "Material of Nacre"}};
-    result.update(schema);
     return result.dump(2) + "\n";
 }
 

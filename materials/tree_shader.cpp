@@ -20,7 +20,9 @@ class Printer {
             if ((topology_.features & feature.bit) != 0)
                 result_.defines += fmt::format("#define {} 1\n", feature.macro);
         }
-        print("#include \"materials/closures/blending.glsl\"\n\n");
+        print(
+            "#include \"materials/closures/blending.glsl\"\n\n#ifndef NACRE_TREE_VERTEX_COLOR\n"
+            "#define NACRE_TREE_VERTEX_COLOR vec4(1.0)\n#endif\n");
         print("const uint tree_closure_count = {}u;\nconst uint tree_frame_count = {}u;\n\n", topology_.closures.size(),
               topology_.frames.size());
         print(
@@ -64,17 +66,22 @@ class Printer {
         return fmt::format("tree_parameter({}u)", result_.parameters.size() - 1);
     }
 
-    // " * (bias + scale * texel)", or nothing.
+    // " * (bias + scale * texel)" and what the vertex adds to it, or nothing.
     std::string texture_factor(NodeIndex node, std::string_view field, std::uint32_t channels) {
+        const auto& colored = tree_.visible_tree.nodes[node].vertex_colored;
+        const std::string by_vertex = std::ranges::find(colored, field) == colored.end() ? ""
+                                      : channels == 3                                    ? " * NACRE_TREE_VERTEX_COLOR.xyz"
+                                                                                         : " * NACRE_TREE_VERTEX_COLOR.w";
         const TextureInput* input = texture_of(node, field);
-        if (input == nullptr) return {};
+        if (input == nullptr) return by_vertex;
         result_.textures.push_back({.node = node, .input = *input});
         constexpr const char* swizzles[] = {"x", "y", "z", "w"};
+        channels = input->gray ? 1 : channels;
         const std::string texel =
             fmt::format("tree_texture({}u).{}", result_.textures.size() - 1,
                         channels == 3 ? (input->channel == 0 ? "xyz" : "yzw") : swizzles[input->channel]);
         const std::string bias = parameter(input->bias), scale = parameter(input->scale);
-        return fmt::format(" * ({} + {} * {})", bias, scale, texel);
+        return fmt::format(" * ({} + {} * {}){}", bias, scale, texel, by_vertex);
     }
 
     void print_slab(std::uint32_t leaf) {

@@ -28,6 +28,7 @@ struct TreeTexture {
 ///     vec4 tree_texture(uint index);      // textures[index], filtered as the includer wants
 ///     and what materials/closures/tables.glsl asks for
 ///     NACRE_TREE_GLINT_POSITION, _DX and _DY, macros: vec2 (materials/slab.h), where glints have a place
+///     NACRE_TREE_VERTEX_COLOR, macro: vec4, where the mesh has colors
 ///
 /// and offers
 ///

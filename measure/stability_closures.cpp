@@ -16,9 +16,6 @@ namespace {
 
 using namespace materials;
 
-constexpr const char* deep_medium_note =
-    "What comes through a deep medium is what a table of 16 bits leaves to 1: where that is some of its steps, few digits "
-    "of single precision are behind it.";
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 /// What the shader reads for one point, in this order; only 32-bit words.
@@ -304,7 +301,6 @@ std::vector<StabilitySubject> closure_subjects() {
             if (is_empty && random() < 0.1) slab.thickness = random() < 0.5 ? 0.0f : 1e-40f;
             if (regime.low > 0.0 && regime.low < 1.0 && random() < 0.3) slab.thickness = infinity;
         }));
-        if (regime.high > 3.0) s.tolerance = 1e-2, s.note = deep_medium_note;
         for (const double depth : {regime.low, 0.5 * (regime.low + regime.high), regime.high}) {
             for (const float phase : {0.0f, 0.8f, -0.8f}) {
                 Slab slab{.f0 = glm::vec3(0.04f), .phase_anisotropy = phase, .thickness = 1e-3f};
@@ -347,8 +343,6 @@ std::vector<StabilitySubject> closure_subjects() {
             s.furnaces.push_back(furnace);
         }
         s.share = 4.0;
-        s.tolerance = 1e-2;
-        s.note = deep_medium_note;
     }
     for (StabilitySubject& subject : subjects) subject.shader.name = subject.name;
     return subjects;

@@ -163,10 +163,7 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
         }
     };
     subject.is_judged_by_host = true;
-    subject.tolerance = 1e-2;
-    subject.note =
-        "Judged by the host in double precision. Coats that reflect nearly everything pass on what is left of 1, and a "
-        "tree multiplies what many of them pass on.";
+    subject.note = "Judged by the host in double precision.";
     const std::size_t width = subject.results.size();
     subject.on_host = [=](const std::uint32_t* words, std::uint32_t count, const float* parameters, double* values) {
         FlattenedTree changed = flat;

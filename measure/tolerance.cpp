@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/text_position.h"
+
 namespace nacre::measure {
 namespace {
 
@@ -77,6 +79,10 @@ Expected<Tolerance> parse_tolerance(std::string_view text, std::string_view sour
     json value;
     try {
         value = json::parse(text);
+    } catch (const json::parse_error& error) {
+        // The parser counts bytes from 1.
+        const TextPosition at = text_position(text, error.byte > 0 ? error.byte - 1 : 0);
+        return reader.wrong(fmt::format("the text is no JSON from line {}, column {}, on", at.line, at.column));
     } catch (const json::exception& error) {
         return reader.wrong(error.what());
     }

@@ -205,7 +205,7 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
         }
         decisions.alpha_test |= draw.alpha_mode == materials::AlphaMode::mask;
         decisions.draws_opaque = true;
-        decisions.emission |= draw.features.emits;
+        decisions.emission |= draw.emits;
         decisions.closures |= draw.has_closures && closures.find(draw.material)->layout.storage_class !=
                                                        materials::StorageClass::simple;
         (draw.features.unlit ? decisions.unlit : decisions.slab) = true;

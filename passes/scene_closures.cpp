@@ -83,7 +83,8 @@ class TextWriter {
         }
         defines_ = std::move(tree.defines);
         print("float tree_parameter(uint index) {{ return tree_row(index >> 2u)[index & 3u]; }}\n");
-        text_ += samples_ + functions;
+        print_samples();
+        text_ += functions;
         text_ += tree.glsl;
         print_closures();
         if (material_.layout.storage_class == StorageClass::simple) {
@@ -108,7 +109,12 @@ class TextWriter {
             print("layout(set = 1, binding = {}) uniform sampler2D closure_texture_{};\n", first_material_texture + i, i);
         }
         print("#include \"materials/closures/table_textures.glsl\"\n");
-        if (has(materials::slab_specular_lut)) print("vec3 specular_lut(uint index, vec2 at) {{ return vec3(1.0); }}\n");
+        if (has(materials::slab_specular_lut)) {
+            print(
+                "layout(set = 1, binding = 4) uniform usampler2D specular_texels;\n"
+                "#include \"materials/closures/specular_tables.glsl\"\n");
+        }
+        print("#ifdef HAS_COLORS\n#define NACRE_TREE_VERTEX_COLOR in_color\n#endif\n");
         if (has(materials::slab_glints)) {
             print(
                 "#ifdef HAS_UV0\n#define NACRE_TREE_GLINT_POSITION in_uv0\n#define NACRE_TREE_GLINT_DX dFdx(in_uv0)\n"
@@ -137,6 +143,14 @@ class TextWriter {
         const auto known = std::ranges::find(material_.textures, reference);
         const auto index = static_cast<std::size_t>(known - material_.textures.begin());
         if (known == material_.textures.end()) material_.textures.push_back(reference);
+        // Several fields may be channels of one texture.
+        const auto same = std::ranges::find_if(samples_, [&](const Sample& at) {
+            return at.texture == index && std::string_view(at.without) == without;
+        });
+        if (same != samples_.end()) {
+            same->is_shared = true;
+            return fmt::format("closure_sample_{}()", same - samples_.begin());
+        }
         std::string texel;
         if (reference.transform.is_identity()) {
             texel = fmt::format("closure_texel({}, {})", index, reference.uv_set);
@@ -145,13 +159,29 @@ class TextWriter {
             write_uv_rows(reference.transform, rows);
             const std::size_t row = numbers(rows[0]);
             numbers(rows[1]);
-            texel = fmt::format("closure_texel_moved({}, {}, tree_row({}u), tree_row({}u))", index, reference.uv_set, row, row + 1);
+            texel = fmt::format("closure_texel_moved({}, {}, tree_row({}u), tree_row({}u))", index, reference.uv_set, row,
+                                row + 1);
         }
-        samples_ += fmt::format(
-            "vec4 closure_sample_{0}() {{\n#ifdef HAS_UV{1}\n    WHERE_UV{1} return {2};\n#endif\n"
-            "#if !defined(HAS_UV{1}) || defined(NACRE_HITS)\n    return {3};\n#endif\n}}\n",
-            sample_count_, reference.uv_set, texel, without);
-        return fmt::format("closure_sample_{}()", sample_count_++);
+        samples_.push_back({index, reference.uv_set, std::move(texel), without});
+        return fmt::format("closure_sample_{}()", samples_.size() - 1);
+    }
+
+    /// The functions that `sample` told of, and read_shared_texels(), which goes before them: what several fields ask
+    /// for is read once.
+    void print_samples() {
+        std::string reads;
+        for (std::size_t i = 0; i < samples_.size(); ++i) {
+            const Sample& at = samples_[i];
+            if (at.is_shared) {
+                print("vec4 shared_texel_{};\n", i);
+                reads += fmt::format("#ifdef HAS_UV{0}\n    WHERE_UV{0} shared_texel_{1} = {2};\n#endif\n", at.uv_set, i, at.texel);
+            }
+            print(
+                "vec4 closure_sample_{0}() {{\n#ifdef HAS_UV{1}\n    WHERE_UV{1} return {2};\n#endif\n"
+                "#if !defined(HAS_UV{1}) || defined(NACRE_HITS)\n    return {3};\n#endif\n}}\n",
+                i, at.uv_set, at.is_shared ? fmt::format("shared_texel_{}", i) : at.texel, at.without);
+        }
+        print("void read_shared_texels() {{\n{}}}\n", reads);
     }
 
     void print_frames() {
@@ -209,15 +239,23 @@ class TextWriter {
     ClosureMaterial& material_;
     const Topology& topology_;
     std::vector<float> numbers_;
-    std::string text_, samples_, defines_;
-    std::uint32_t sample_count_ = 0;
+    struct Sample {
+        std::size_t texture;  ///< Into ClosureMaterial::textures.
+        std::uint32_t uv_set;
+        std::string texel;
+        const char* without;
+        bool is_shared = false;  ///< By several fields.
+    };
+    std::string text_, defines_;
+    std::vector<Sample> samples_;
 };
 
 /// Names that every topology's text and what is included behind it define: in one shader they need to differ.
 std::set<std::string> names_of_topology(const std::string& text) {
     std::set<std::string> names = {"TreeState", "shade_tree", "pack_tree", "stored_words", "stored_top_closure",
                                    "stored_top_frame", "stored_has_subsurface", "SurfaceFrames", "surface_frames",
-                                   "stored_frame", "shade_surface", "closure_words", "closure_properties"};
+                                   "stored_frame", "shade_surface", "closure_words", "closure_properties",
+                                   "read_shared_texels"};
     const auto is_part = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
     for (std::size_t i = 0; i < text.size();) {
         if (!is_part(text[i])) {
@@ -228,7 +266,7 @@ std::set<std::string> names_of_topology(const std::string& text) {
         while (i < text.size() && is_part(text[i])) ++i;
         std::string name = text.substr(start, i - start);
         // tree_row() is there for all of them.
-        if ((name.starts_with("tree_") || name.starts_with("closure_sample_")) && name != "tree_row") {
+        if ((name.starts_with("tree_") || name.starts_with("closure_sample_") || name.starts_with("shared_texel_")) && name != "tree_row") {
             names.insert(std::move(name));
         }
     }
@@ -297,6 +335,8 @@ Expected<SceneClosures> SceneClosures::choose(const scene::Scene& scene, const P
             files->blend = wrap("passes/blend/blend.closures.glsl");
             files->blend_path = fmt::format("passes/closures/blend_{}.frag", material.topology);
             files->points_path = fmt::format("passes/closures/surface_points_{}.frag", material.topology);
+            files->emission = wrap("passes/emission/emission.closures.glsl");
+            files->emission_path = fmt::format("passes/closures/emission_{}.frag", material.topology);
             result.texts_.push_back(std::move(files));
         }
         for (std::uint32_t table = 0; table < closure_table_count; ++table) {
@@ -332,6 +372,9 @@ ShadingFeatures SceneClosures::features_of(const ClosureMaterial& material, cons
     const bool needs_uv0 = (material.features & materials::slab_glints) != 0 ||
                            std::ranges::any_of(material.textures, [](const auto& t) { return t.uv_set == 0; });
     const bool needs_uv1 = std::ranges::any_of(material.textures, [](const auto& t) { return t.uv_set == 1; });
+    const bool needs_colors = std::ranges::any_of(material.flat.visible_tree.nodes,
+                                                  [](const materials::Node& node) { return !node.vertex_colored.empty(); });
+    if (needs_colors && !primitive.colors.empty()) features.attributes |= attribute_bit(Attribute::color);
     if (needs_uv0 && !primitive.uv0.empty()) features.attributes |= attribute_bit(Attribute::uv0);
     if (needs_uv1 && !primitive.uv1.empty()) features.attributes |= attribute_bit(Attribute::uv1);
     return features;
@@ -343,6 +386,7 @@ std::vector<EmbeddedFile> SceneClosures::files() const {
         result.push_back({text->topology_path, text->topology});
         result.push_back({text->base_pass_path, text->base_pass});
         result.push_back({text->blend_path, text->blend});
+        result.push_back({text->emission_path, text->emission});
         // The same for all: it writes down places.
         result.push_back({text->points_path, "#version 460\n#include \"passes/hit_shading/surface_points.glsl\"\n"});
     }
@@ -363,7 +407,7 @@ std::string SceneClosures::hit_text() const {
     for (const materials::SlabFeature& feature : materials::slab_features()) {
         if ((features & feature.bit) != 0) text += fmt::format("#define {} 1\n", feature.macro);
     }
-    constexpr const char* tables[closure_table_count] = {"interface", "medium", "anisotropy"};
+    constexpr const char* tables[closure_table_count] = {"interface", "medium", "anisotropy", "specular"};
     for (std::uint32_t i = 0; i < closure_table_count; ++i) {
         if (reads_table(features, i)) {
             text += fmt::format("layout(set = 2, binding = {}) uniform usampler2D {}_texels;\n", 1 + i, tables[i]);
@@ -371,8 +415,9 @@ std::string SceneClosures::hit_text() const {
     }
     text += "#include \"materials/closures/table_textures.glsl\"\n";
     if ((features & materials::slab_specular_lut) != 0) {
-        text += "vec3 specular_lut(uint index, vec2 at) { return vec3(1.0); }\n";
+        text += "#include \"materials/closures/specular_tables.glsl\"\n";
     }
+    text += "#define NACRE_TREE_VERTEX_COLOR in_color\n";
     if ((features & materials::slab_glints) != 0) {
         text +=
             "#define NACRE_TREE_GLINT_POSITION in_uv0\n#if TEXTURE_DETAIL == 0\n#define NACRE_TREE_GLINT_DX in_uv0_dx\n"

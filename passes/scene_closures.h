@@ -41,11 +41,12 @@ struct ClosureMaterial {
     [[nodiscard]] bool writes_slices() const { return layout.material_words() > 2 || layout.has_subsurface; }
 };
 
-/// Bindings of set 1: the blob, three tables for closures, the sideband (of trees: their numbers), then textures.
-inline constexpr std::uint32_t closure_table_count = 3;  ///< Interface, medium, anisotropy.
+/// Bindings of set 1: the blob, four tables for closures, the sideband (of trees: their numbers), then textures.
+inline constexpr std::uint32_t closure_table_count = 4;  ///< Interface, medium, anisotropy, specular tints.
 /// Whether closures with these features read a table.
 [[nodiscard]] constexpr bool reads_table(std::uint32_t features, std::uint32_t table) {
-    constexpr std::uint32_t needed_by[closure_table_count] = {0, materials::slab_medium, materials::slab_anisotropy};
+    constexpr std::uint32_t needed_by[closure_table_count] = {0, materials::slab_medium, materials::slab_anisotropy,
+                                                            materials::slab_specular_lut};
     return table == 0 || (features & needed_by[table]) != 0;
 }
 inline constexpr std::uint32_t sideband_binding = 1 + closure_table_count;
@@ -76,14 +77,15 @@ class SceneClosures {
         std::uint32_t slices = 0;         ///< Of the storage image: words beyond the second; last, subsurface data.
     };
     [[nodiscard]] const Lighting& lighting() const { return lighting_; }
-    /// Which tables the materials' shaders read: bits 0 to 2 as closure_table_count tells.
+    /// Which tables the materials' shaders read: bits as closure_table_count tells.
     [[nodiscard]] std::uint32_t tables() const { return tables_; }
 
     /// What drawing a primitive with a material of this scene needs; `material` is one that find() knows.
     [[nodiscard]] static ShadingFeatures features_of(const ClosureMaterial& material, const scene::Primitive& primitive,
                                                      bool double_sided);
 
-    /// GLSL files of all topologies: "passes/closures/base_pass_N.frag" and "passes/closures/blend_N.frag". They live
+    /// GLSL files of all topologies: "passes/closures/base_pass_N.frag", "passes/closures/blend_N.frag" and
+    /// "passes/closures/emission_N.frag". They live
     /// as long as this object.
     [[nodiscard]] std::vector<EmbeddedFile> files() const;
     /// GLSL for hits of rays (passes/shared/hit_shading.glsl): the closures' library with the features of all materials, the
@@ -97,6 +99,7 @@ class SceneClosures {
         std::string topology, topology_path;
         std::string base_pass, base_pass_path;
         std::string blend, blend_path;
+        std::string emission, emission_path;
         std::string points_path;
         std::uint32_t first_material = 0;        ///< One that has it.
         materials::TextureReference occlusion;   ///< Of that one.

@@ -117,9 +117,12 @@ Expected<std::unique_ptr<SceneGeometry>> SceneGeometry::create(rhi::Device& devi
                 draw.two_faces = slab.double_sided || primitive.topology != scene::Topology::triangle_list;
                 draw.alpha_mode = slab.alpha_mode;
                 const ClosureMaterial* closure_material = closures.find(primitive.material);
+                draw.emits = draw.features.emits;
                 if (closure_material != nullptr && !primitive.normals.empty()) {
                     draw.has_closures = true;
+                    draw.emits = (closure_material->features & materials::slab_emission) != 0;
                     draw.closure_features = SceneClosures::features_of(*closure_material, primitive, slab.double_sided);
+                    if (!with_colors) draw.closure_features.attributes &= ~attribute_bit(Attribute::color);
                     if (closure_material->is_translucent) draw.alpha_mode = materials::AlphaMode::blend;
                 }
                 draw.index_offset = indices.size();

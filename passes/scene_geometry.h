@@ -27,6 +27,7 @@ struct Draw {
     ShadingFeatures features;
     ShadingFeatures closure_features;  ///< Where the material is shaded by closures.
     bool has_closures = false;
+    bool emits = false;  ///< By whichever of both shades it.
     scene::Topology topology = scene::Topology::triangle_list;
     bool mirrored = false;      ///< Front faces wind clockwise.
     bool two_faces = false;     ///< Back faces are drawn too.

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fmt/format.h>
 
+#include "materials/specular_table.h"
 #include "materials/tables/anisotropy_table.h"
 #include "materials/tables/interface_table.h"
 #include "materials/tables/medium_table.h"
@@ -82,10 +83,13 @@ Expected<rhi::Sampler> SceneMaterials::sampler_of(const scene::Scene& scene, int
     return samplers_[index];
 }
 
-Expected<void> SceneMaterials::upload_tables(std::uint32_t tables) {
+Expected<void> SceneMaterials::upload_tables(const scene::Scene& scene, std::uint32_t tables) {
+    const std::vector<std::uint16_t> tints = materials::specular_table_words(
+        scene.specular_tables.empty() ? materials::default_specular_tables() : scene.specular_tables);
     const std::span<const std::uint16_t> contents[closure_table_count] = {
-        materials::interface_table(), materials::medium_table(), materials::anisotropy_table()};
-    constexpr const char* names[closure_table_count] = {"interface table", "medium table", "anisotropy table"};
+        materials::interface_table(), materials::medium_table(), materials::anisotropy_table(), tints};
+    constexpr const char* names[closure_table_count] = {"interface table", "medium table", "anisotropy table",
+                                                           "specular tables"};
     NACRE_TRY(table_sampler_, device_.create_sampler({.magnify = rhi::Filter::nearest,
                                                       .minify = rhi::Filter::nearest,
                                                       .mip = rhi::Filter::nearest,
@@ -288,7 +292,7 @@ Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& de
     result->slabs_.resize(slabs.size());
     result->blobs_.resize(slabs.size());
     // Plain slabs are lit with the first table.
-    NACRE_CHECK(result->upload_tables(closures.tables() | 1u));
+    NACRE_CHECK(result->upload_tables(scene, closures.tables() | 1u));
     if (slabs.empty()) return result;
     if (slabs.size() > max_materials) {
         return fail(ErrorCode::unsupported, "upload materials", fmt::format("'{}'", scene.name),

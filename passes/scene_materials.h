@@ -85,7 +85,7 @@ class SceneMaterials {
     Expected<rhi::Texture> upload_image(const scene::Scene& scene, int image, bool with_mips);
     Expected<rhi::Sampler> make_sampler(const scene::Sampler& sampler, float anisotropy);
 
-    Expected<void> upload_tables(std::uint32_t tables);
+    Expected<void> upload_tables(const scene::Scene& scene, std::uint32_t tables);
     Expected<BoundTexture> texture_for(const scene::Scene& scene, const materials::TextureReference& reference,
                                        float anisotropy);
     std::uint32_t place_of(rhi::Texture texture) const;

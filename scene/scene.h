@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "materials/description.h"
+#include "materials/specular_table.h"
 
 /// @file
 /// A scene as plain data, ready to be drawn: every vertex is final (morph targets, skins and animations are already
@@ -164,6 +165,8 @@ struct Scene {
     std::vector<Camera>
         cameras;  ///< At least one; the first is the default. Made by `framing_camera` if the file has none.
     std::vector<Light> lights;
+    /// What Slab::specular_lut of the materials' trees counts in; empty: materials::default_specular_tables().
+    std::vector<materials::SpecularTable> specular_tables;
     Environment environment;            ///< Always present; `studio_environment()` where the source has none.
     float time = 0.0f;                  ///< Seconds at which animations were evaluated.
     std::vector<std::string> warnings;  ///< What was wrong but survivable, one sentence each.

@@ -250,6 +250,11 @@ struct DoubleImageArguments {
     alignas(64) double result[4][max_lanes];  ///< Zero in lanes that are not live.
 };
 
+/// The four words of a texel, as the shader sees it.
+struct TexelWords {
+    std::uint64_t first_two, last_two;
+};
+
 }  // namespace nacre::cpu
 
 // Functions that compiled code calls. `flags` is an ImageOperation with ImageFlags. `live` has one bit for each lane; samples with
@@ -262,4 +267,8 @@ using NacreCpuDoubleImageFunction = void (*)(const nacre::cpu::ImageView* image,
                                              const nacre::cpu::SamplerState* sampler,
                                              nacre::cpu::DoubleImageArguments* arguments, std::uint32_t flags,
                                              std::uint32_t live);
+// ImageOperation::fetch of one texel, by the coordinates in their order and the level; for all dimensions but cubes.
+using NacreCpuTexelFunction = nacre::cpu::TexelWords (*)(const nacre::cpu::ImageView* image, std::uint32_t first,
+                                                         std::uint32_t second, std::uint32_t third,
+                                                         std::uint32_t level, std::uint32_t flags);
 }

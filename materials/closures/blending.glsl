@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef NACRE_CLOSURES_BLENDING
 #define NACRE_CLOSURES_BLENDING
+#include "materials/closures/conversions.glsl"
 #include "materials/closures/operators.glsl"
 
 // One slab in place of two, where a mix or a layer must do with one closure: their parameters blended by how much of
@@ -31,7 +32,12 @@ Slab blend_slabs(Slab a, Slab b, BlendShares shares) {
     slab.coverage = shares.coverage;
     float t = blend_share(shares.first, shares.second);
     slab.f0 = blend_color(a.f0, b.f0, shares.first_light, shares.second_light, shares.coverage);
-    slab.albedo = blend_color(a.albedo, b.albedo, shares.first_light, shares.second_light, shares.coverage);
+    vec3 entering_a = (vec3(1.0) - a.f0) * shares.first_light;
+    vec3 entering_b = (vec3(1.0) - b.f0) * shares.second_light;
+    vec3 reflecting = a.albedo * entering_a + b.albedo * entering_b;
+    vec3 entering = (vec3(1.0) - slab.f0) * shares.coverage;
+    slab.albedo = vec3(blended_albedo(reflecting.x, entering.x), blended_albedo(reflecting.y, entering.y),
+                       blended_albedo(reflecting.z, entering.z));
     // A bright lobe shows its shape more than a dim one.
     float gloss = blend_share(shares.first * largest(a.f0), shares.second * largest(b.f0));
     slab.roughness = mix(a.roughness, b.roughness, gloss);

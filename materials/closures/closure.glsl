@@ -6,6 +6,9 @@
 #include "materials/closures/ggx.glsl"
 #include "materials/closures/slab.glsl"
 #include "materials/closures/tables.glsl"
+#ifdef NACRE_SLAB_EDGE_COVERAGE
+#include "materials/closures/conversions.glsl"
+#endif
 #ifdef NACRE_SLAB_FUZZ
 #include "materials/closures/fuzz.glsl"
 #endif
@@ -36,7 +39,9 @@
 //     vec3 closure_transmittance(Closure closure, float cos_theta)    straight through the medium, by outer direction
 //     vec3 closure_throughput(Closure closure)                        of the view: through fuzz, interface and medium
 //     float slab_coverage(Slab slab, float cos_theta)                 where a slab may have slab_edge_coverage
+//     float slab_bare(Slab slab, float cos_theta)                     the rest of the surface
 //     vec3 internal_transmittance(Slab slab)                          of diffuse light from the medium's side
+//     vec3 internal_reflectance(Slab slab)                            the rest of that
 //
 // With NACRE_CLOSURE_COVERED (materials/closures/operators.glsl defines it) closures may be seen through layers:
 //     Closure cover_closure(Closure closure, vec3 spread, float under_interface)
@@ -176,17 +181,25 @@ SpecularLobe make_specular_lobe(Fresnel fresnel, vec3 view, float roughness, flo
         // All that it reflects comes along one direction.
         albedo.missing = 0.0;
         albedo.schlick = power5(1.0 - cosine);
+#ifdef NACRE_SLAB_F82
         albedo.dip = cosine * albedo.schlick * (1.0 - cosine);
+#endif
         rest = schlick_rest(cosine, 1.0 - cosine);
     }
-    vec3 single = max(fresnel.normal * rest + fresnel.grazing * albedo.schlick - fresnel.dip * albedo.dip, vec3(0.0));
-    vec3 not_single = (vec3(1.0) - fresnel.normal) * rest + (vec3(1.0) - fresnel.grazing) * albedo.schlick +
-                      fresnel.dip * albedo.dip;
+    vec3 single = fresnel.normal * rest + fresnel.grazing * albedo.schlick;
+    vec3 not_single = (vec3(1.0) - fresnel.normal) * rest + (vec3(1.0) - fresnel.grazing) * albedo.schlick;
+#ifdef NACRE_SLAB_F82
+    single = max(single - fresnel.dip * albedo.dip, vec3(0.0));
+    not_single += fresnel.dip * albedo.dip;
+#endif
     // Of what a facet sends on to others, these do not reflect.
-    vec3 lost = fresnel_mean_transmittance(fresnel) * albedo.missing;
+    vec3 entering = fresnel_mean_transmittance(fresnel);
+    vec3 lost = entering * albedo.missing;
     lobe.albedo = single * (vec3(1.0) - lost);
     lobe.passed = not_single + single * lost;
-    vec3 scale = vec3(1.0) + fresnel_mean(fresnel) * (albedo.missing / (1.0 - albedo.missing));
+    // 1 + mean reflectance * missing / (1 - missing).
+    float again = albedo.missing / (1.0 - albedo.missing);
+    vec3 scale = vec3(1.0 + again) - entering * again;
     if (lobe.is_mirror) scale = vec3(0.0);
 #ifdef NACRE_CLOSURE_CURVES
     lobe.reflectance = scaled_fresnel(fresnel, scale);
@@ -256,18 +269,30 @@ vec3 internal_transmittance(Slab slab) {
     return clamp(mean / (ior * ior), vec3(0.05), vec3(1.0));
 }
 
+// 1 - internal_transmittance, with all digits where the medium is hardly denser.
+vec3 internal_reflectance(Slab slab) {
+    Fresnel fresnel = slab_fresnel(slab);
+    vec3 root = sqrt(clamp(slab.f0, vec3(0.0), vec3(0.2)));
+    vec3 outside = (vec3(1.0) + root) * (vec3(1.0) + root);
+    // 1 - 1 / ior^2 is 4 root / (1 + root)^2.
+    return min(fresnel_mean(fresnel) + fresnel_mean_transmittance(fresnel) * 4.0 * root / outside, vec3(0.95));
+}
+
 #ifdef NACRE_SLAB_MEDIUM
 // What becomes of light inside the slab, for each channel.
 struct MediumScattering {
     vec3 reflected;  // back to the interface
     vec3 through;    // scattered, out of the far side
     vec3 straight;   // out of the far side without an event
+    vec3 absorbed;
+    vec3 kept;  // what is not reflected: the sum of the three above
     vec3 opaque;
 };
 
 // Light that goes up from the medium to the interface in all, where what it throws back is reflected again, and again.
-vec3 upwards_in_medium(vec3 reflected, vec3 leaving, vec3 reflected_again) {
-    return reflected / max((vec3(1.0) - reflected_again) + leaving * reflected_again, vec3(1e-9));
+// kept_again: 1 - reflected_again.
+vec3 upwards_in_medium(vec3 reflected, vec3 leaving, vec3 reflected_again, vec3 kept_again) {
+    return reflected / max(kept_again + leaving * reflected_again, vec3(1e-9));
 }
 
 // One channel. The authored albedo has the interface's part in it, which lets `leaving` of diffuse light out and throws
@@ -288,6 +313,8 @@ MediumScattering slab_scattering(Slab slab, float cosine) {
     medium.reflected = vec3(x.reflected, y.reflected, z.reflected);
     medium.through = vec3(x.through, y.through, z.through);
     medium.straight = vec3(x.straight, y.straight, z.straight);
+    medium.absorbed = vec3(x.absorbed, y.absorbed, z.absorbed);
+    medium.kept = medium.through + medium.straight + medium.absorbed;
     medium.opaque = vec3(x.opaque, y.opaque, z.opaque);
     return medium;
 }
@@ -405,7 +432,7 @@ Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprin
         vec3 leaving = internal_transmittance(slab);
         MediumScattering medium = slab_scattering(slab, inside);
         MediumScattering again = slab_scattering(slab, mean_cosine);
-        vec3 upwards = upwards_in_medium(medium.reflected, leaving, again.reflected);
+        vec3 upwards = upwards_in_medium(medium.reflected, leaving, again.reflected, again.kept);
         vec3 share = vec3(subsurface_share(slab.albedo.x, slab.mean_free_path.x, footprint),
                           subsurface_share(slab.albedo.y, slab.mean_free_path.y, footprint),
                           subsurface_share(slab.albedo.z, slab.mean_free_path.z, footprint));
@@ -487,7 +514,7 @@ ClosureValue evaluate_closure_above(Closure closure, vec3 light) {
     float length_squared = dot(sum, sum);
     float inverse_length = inversesqrt(length_squared);
     vec3 h = sum * inverse_length;
-    float half_cosine = 0.5 * length_squared * inverse_length;
+    float half_cosine = min(0.5 * length_squared * inverse_length, 1.0);
     value.specular = specular_lobe_value(closure, closure.specular, light, h, half_cosine);
 #ifdef NACRE_SLAB_GLINTS
     // The second lobe stays smooth: it is the haze around the facets.
@@ -662,12 +689,15 @@ vec3 closure_throughput(Closure closure) {
 // Coverage of a slab seen from a cosine to its normal.
 float slab_coverage(Slab slab, float cos_theta) {
     if ((slab.features & slab_edge_coverage) == 0u) return slab.coverage;
-    // (1 - c)^exponent and what is left of 1: near the surface that is small, and may be all there is.
-    float steps = slab.edge_exponent * minus_log_rest(saturated(cos_theta));
-    float rest = exponential_rest(steps);
-    // Both make 1: a coverage above 1 would leave less than nothing beside it.
-    float left = steps < 0.01 ? 1.0 - rest : exp(-steps);
-    return min(slab.coverage * rest + slab.edge_coverage * left, 1.0);
+    return view_dependent_coverage(slab.coverage, slab.edge_coverage, slab.edge_exponent, cos_theta);
+}
+
+// 1 - slab_coverage, with all digits where that is near 1.
+float slab_bare(Slab slab, float cos_theta) {
+    if ((slab.features & slab_edge_coverage) == 0u) return max(1.0 - slab.coverage, 0.0);
+    return max((1.0 - slab.coverage) * facing_share(cos_theta, slab.edge_exponent) +
+                   (1.0 - slab.edge_coverage) * grazing_share(cos_theta, slab.edge_exponent),
+               0.0);
 }
 #endif
 

@@ -14,7 +14,7 @@ float lambert_diffuse(vec3 light) { return max(light.z, 0.0) * inverse_pi; }
 // retro-reflection turns negative (gloss above 0.71) it is 0 here.
 float chan_gloss(float roughness) {
     float alpha = roughness * roughness;
-    return saturated(log2(2.0 / max(alpha * alpha, 1e-7) - 1.0) / 18.0);
+    return saturated(log2(2.0 / max(alpha * alpha, 1e-7) - 1.0) * (1.0 / 18.0));
 }
 
 float chan_glossiness(float gloss) { return saturated(2.2 * gloss - 0.5); }
@@ -22,7 +22,8 @@ float chan_retro_amplitude(float gloss) { return max((34.5 * gloss - 59.0) * glo
 
 // Exponent of the retro-reflection: 8.9 for all rough surfaces, 30.8 where it ends.
 float chan_sharpness(float gloss) { return max(73.2 * gloss - 21.2, 8.9); }
-float chan_sharpness_coordinate(float sharpness) { return saturated((sharpness - 8.9) / 21.9); }
+// In the table, which ends at 1.
+float chan_sharpness_coordinate(float sharpness) { return (sharpness - 8.9) * (1.0 / 21.9); }
 float chan_sharpness_at(float coordinate) { return 8.9 + 21.9 * coordinate; }
 
 // half_cosine and normal_half: the cosines of the half vector of two directions above the surface to these and to the
@@ -50,8 +51,8 @@ ChanView chan_view(float view_cosine, float gloss, float scale) {
     return chan;
 }
 
-// For a light above the surface; half_cosine and normal_half as in chan_retro. A cosine that rounding made larger than 1
-// does no harm.
+// For a light above the surface; half_cosine and normal_half as in chan_retro. A light_cosine that rounding made larger
+// than 1 does no harm.
 float chan_diffuse_of(ChanView chan, float light_cosine, float half_cosine, float normal_half) {
     float rough = half_cosine + power5(1.0 - half_cosine);
     float glossy = 1.0 - 0.75 * power5(1.0 - light_cosine);

@@ -66,12 +66,14 @@ vec3 fresnel_transmittance(Fresnel fresnel, float cos_theta) {
 
 // Mean over a hemisphere under diffuse light: integral of 2 c F(c).
 vec3 fresnel_mean(Fresnel fresnel) {
-    return max(fresnel.normal + (fresnel.grazing - fresnel.normal) / 21.0 - fresnel.dip / 126.0, vec3(0.0));
+    return max(fresnel.normal + (fresnel.grazing - fresnel.normal) * (1.0 / 21.0) - fresnel.dip * (1.0 / 126.0),
+               vec3(0.0));
 }
 
 // 1 - fresnel_mean.
 vec3 fresnel_mean_transmittance(Fresnel fresnel) {
-    return (vec3(1.0) - fresnel.normal) * (20.0 / 21.0) + (vec3(1.0) - fresnel.grazing) / 21.0 + fresnel.dip / 126.0;
+    return (vec3(1.0) - fresnel.normal) * (20.0 / 21.0) + (vec3(1.0) - fresnel.grazing) * (1.0 / 21.0) +
+           fresnel.dip * (1.0 / 126.0);
 }
 
 // Index of refraction of a dielectric by its reflectance at normal incidence, and back. An index above 199 (reflectance

@@ -45,6 +45,7 @@ struct Library : Lobes {
 #define const static constexpr
 #include "materials/closures/operators.glsl"
 #include "materials/closures/blending.glsl"
+#include "materials/closures/stored_frame.glsl"
 #undef const
 #undef float
 #undef NACRE_SLAB_ANISOTROPY

@@ -27,6 +27,7 @@ using glm::sin, glm::smoothstep, glm::sqrt;
 
 struct Lobes {
     using uint = std::uint32_t;
+    using uvec2 = glm::uvec2;
     using vec2 = glm::dvec2;
     using vec3 = glm::dvec3;
     using vec4 = glm::dvec4;
@@ -35,6 +36,7 @@ struct Lobes {
 #define float double
 #define const static constexpr
 #include "materials/closures/classic.glsl"
+#include "materials/closures/conversions.glsl"
 #include "materials/closures/diffuse.glsl"
 #include "materials/closures/fresnel.glsl"
 #include "materials/closures/fuzz.glsl"
@@ -42,6 +44,8 @@ struct Lobes {
 #include "materials/closures/glints.glsl"
 #include "materials/closures/haze.glsl"
 #include "materials/closures/math.glsl"
+#include "materials/closures/medium_inputs.glsl"
+#include "materials/closures/octahedral.glsl"
 #include "materials/closures/stored_fields.glsl"
 #include "materials/closures/thin_film.glsl"
 #undef const

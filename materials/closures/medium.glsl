@@ -1,61 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #ifndef NACRE_CLOSURES_MEDIUM
 #define NACRE_CLOSURES_MEDIUM
-#include "materials/closures/math.glsl"
+#include "materials/closures/medium_inputs.glsl"
 // A layer of a scattering and absorbing medium between two planes, from opaque to empty. Who includes this has defined
 //
 //     vec2 medium_table(vec3 at)    materials/tables/medium_table.h, interpolated as those of tables.glsl
-
-// Lengths that are divided stay between these: meters.
-const float shortest_length = 1e-12;
-const float longest_length = 1e12;
-
-// The similarity parameter sqrt((1 - w) / (1 - w g)), w being the albedo of a single scattering and g the phase
-// anisotropy, of a medium that reflects `albedo` if it is infinitely thick, and back. 0: nothing is absorbed, 1:
-// nothing is scattered. Source: van de Hulst 1980, in the form of Kulla and Conty 2017; round trip within 2e-5.
-// darkness: 1 - albedo, which has more digits than the albedo where both follow from something else.
-float medium_similarity(float albedo, float darkness) {
-    float root = sqrt(9.59217 + albedo * (41.6808 + albedo * 17.7126));
-    // 4.09712 + 4.20863 albedo - root, multiplied out so that the ends are exact and no digits cancel.
-    return clamp(7.19424 * darkness / (4.09712 + 4.20863 * albedo + root), 0.0, 1.0);
-}
-
-// 1 - medium_similarity, with all digits where that is near 1: the same fit multiplied out from the other end.
-float medium_dissimilarity(float albedo) {
-    float root = sqrt(9.59217 + albedo * (41.6808 + albedo * 17.7126));
-    float rise = (41.6808 + 17.7126 * albedo) / (root + 3.0971232);
-    return clamp(albedo * (rise + 11.40287) / (4.09712 + 4.20863 * albedo + root), 0.0, 1.0);
-}
-
-float medium_albedo(float similarity) {
-    return (1.0 - similarity) * (1.0 - 0.139 * similarity) / (1.0 + 1.17 * similarity);
-}
-
-// Albedo of a single scattering, by 1 - similarity: so a small one has its digits.
-float scattering_albedo(float dissimilarity, float phase_anisotropy) {
-    float single = dissimilarity * (2.0 - dissimilarity);
-    return single / (1.0 - phase_anisotropy * (1.0 - single));
-}
-
-// Mean free path in a medium that lets `transmittance` through `distance`, both in any range; and back.
-float transmittance_to_mean_free_path(float transmittance, float distance) {
-    float depth = -log(clamp(transmittance, 1e-30, 1.0));
-    return clamp(distance / max(depth, 1e-24), 0.0, longest_length);
-}
-
-float optical_depth(float mean_free_path, float distance) {
-    return clamp(distance, 0.0, longest_length) / clamp(mean_free_path, shortest_length, longest_length);
-}
-
-float medium_transmittance(float mean_free_path, float distance) {
-    return exp(-optical_depth(mean_free_path, distance));
-}
 
 // What becomes of light that enters the layer.
 struct Scattering {
     float reflected;
     float through;   // scattered, out of the far side
     float straight;  // out of the far side without an event
+    float absorbed;  // the rest, but not found as what the others leave of 1
     float opaque;    // how much of `reflected` is that of an infinitely thick medium, [0, 1]
 };
 
@@ -69,35 +25,42 @@ Scattering medium_scattering(float albedo, float darkness, float depth, float ph
     Scattering result;
     float similarity = medium_similarity(albedo, darkness);
     float dissimilarity = medium_dissimilarity(albedo);
-    float single = dissimilarity * (2.0 - dissimilarity);
-    float inverse = 1.0 / (1.0 - phase_anisotropy * similarity * similarity);
+    // The constants of both fits are rounded: the smaller one counts, so that what is scattered and absorbed makes 1.
+    bool is_bright = similarity < 0.5;
+    float single = is_bright ? 1.0 - similarity * similarity : dissimilarity * (2.0 - dissimilarity);
+    float absorption = is_bright ? similarity * similarity : 1.0 - single;
+    float inverse = 1.0 / (1.0 - phase_anisotropy * absorption);
     float reduced = depth * (1.0 - phase_anisotropy) * inverse;
     float column = sqrt(clamp(cosine, 0.0, 1.0));
     float row = medium_table_row(reduced);
     float slice = sqrt(similarity);
     vec2 entry = medium_table(vec3(column, row, slice));
     vec2 infinite = medium_table(vec3(column, 1.0, slice));
-    float hit = exponential_rest(reduced / max(cosine, smallest_cosine));
+    float inside = max(cosine, smallest_cosine);
+    float hit = exponential_rest(reduced / inside);
     // Deeper than the table, what comes through falls with the depth.
-    float forth = max(1.0 - entry.x, 0.0) * min(4096.0 / max(reduced, 1e-6), 1.0);
+    float forth = entry.x * min(4096.0 / max(reduced, 1e-6), 1.0);
     float back = 1.0 - forth;
-    float escaping = hit * single * entry.y;
+    float escaping = hit * single * (1.0 - entry.y);
+    float reflected = escaping * back;
+    float absorbed = hit * (absorption + single * entry.y);
     result.opaque = hit * hit * saturated(2.0 * back - 1.0);
-    // An infinitely thick medium reflects its albedo towards every angle, as an opaque one does.
-    float toward_albedo = mix(1.0, albedo / max(single * infinite.y, 1e-30), result.opaque);
+    // An infinitely thick medium reflects its albedo towards every angle, as an opaque one does. The difference is that
+    // of the smaller numbers, of what is reflected or of what is not.
+    float infinite_albedo = single * (1.0 - infinite.y);
+    float missing = albedo < 0.5 ? albedo - infinite_albedo : absorption + single * infinite.y - darkness;
+    // What is added must be there to be had.
+    float added = min(reflected * result.opaque * missing / max(infinite_albedo, 1e-30), absorbed);
+    result.reflected = reflected + added;
+    result.absorbed = absorbed - added;
     // Of the light that the isotropic medium lets through straight, this one scatters some forward; a backward phase
     // function takes some of it.
-    float inside = max(cosine, smallest_cosine);
     float forward = depth * phase_anisotropy * single * inverse / inside;
     result.straight = exp(-depth / inside);
     float through = escaping * forth + (forward > 0.0 ? exp(-reduced / inside) * exponential_rest(forward)
-                                                             : -result.straight * exponential_rest(-forward));
+                                                      : -result.straight * exponential_rest(-forward));
     result.through = max(through, 0.0);
     result.straight = max(result.straight + min(through, 0.0), 0.0);
-    // What is added for that must be there to be had.
-    float reflected = escaping * back;
-    float added = similarity > 0.0 ? reflected * (toward_albedo - 1.0) : 0.0;
-    result.reflected = reflected + min(added, max(1.0 - reflected - result.through - result.straight, 0.0));
     return result;
 }
 

@@ -49,6 +49,10 @@ float tracked_roughness(float roughness, Widening widening) {
 // "Authoring Materials that matter", SIGGRAPH 2023; the formulae are ours. Any subtree counts as one piece of matter
 // whose parts lie independently of each other, so that a slab yields one closure whatever is above it.
 
+// 1 - (1 - a)(1 - b), for what happens here or there, with all digits where both are small.
+float either(float a, float b) { return a + b * (1.0 - a); }
+vec3 either(vec3 a, vec3 b) { return a + b * (vec3(1.0) - a); }
+
 // How much what is seen through a subtree spreads. Known before any closure is, since closures depend on it.
 struct Spread {
     float coverage;
@@ -56,17 +60,20 @@ struct Spread {
     float variance;  // that the covered share adds to it
 };
 
-// What a layer does with light from below: what it throws back, and what leaves it. The two make 1 where nothing is
-// absorbed; what the medium takes of light that leaves is not in it, but in Matter::transmittance.
+// What a layer does with light from below: what it throws back, what leaves it, and the rest, which has its own formulae:
+// light that is thrown back and forth many times shows how much is taken each time, and 1 - back - leaving would not have
+// its digits. What the medium takes of light that leaves is not in it, but in Matter::transmittance.
 struct Underside {
     vec3 back;
     vec3 leaving;
+    vec3 absorbed;
 };
 
-// A slab, or what stands for a subtree, as what lies below and above it sees it. All but coverage are those of the
-// covered share; where nothing is covered they mean nothing.
+// A slab, or what stands for a subtree, as what lies below and above it sees it. All but coverage and bare are those of
+// the covered share; where nothing is covered they mean nothing.
 struct Matter {
     float coverage;
+    float bare;               // 1 - coverage: what lies below may be seen through nothing else
     vec3 transmittance;       // of light along the normal that is not scattered back: what the medium leaves of it
     vec3 view_transmittance;  // of what is seen through it in the view direction: interface, fuzz and medium
     Underside diffuse;        // for diffuse light from below
@@ -74,6 +81,7 @@ struct Matter {
     Underside trapped;        // for light that comes at the angles at which it was totally reflected before
     vec3 albedo;              // reflectance for diffuse light from above
     vec3 passed;              // of diffuse light from above, what reaches the other side
+    vec3 absorbed;            // of diffuse light from above, the rest
     vec3 gloss;               // share of what is reflected towards the view that a lobe mirrors
     float alpha2;             // squared GGX alpha of that lobe, as it is seen from outside
     float ior;                // against what lies above
@@ -93,6 +101,7 @@ struct Path {
 
 #ifndef NACRE_SLAB_EDGE_COVERAGE
 float slab_coverage(Slab slab, float cos_theta) { return slab.coverage; }
+float slab_bare(Slab slab, float cos_theta) { return max(1.0 - slab.coverage, 0.0); }
 #endif
 
 Spread slab_spread(Slab slab, float cos_view) {
@@ -154,14 +163,17 @@ Slab track_slab(Slab slab, Widening widening) {
 Matter no_matter() {
     Matter m;
     m.coverage = 0.0;
+    m.bare = 1.0;
     m.transmittance = vec3(1.0);
     m.view_transmittance = vec3(1.0);
     m.diffuse.back = vec3(0.0);
     m.diffuse.leaving = vec3(1.0);
+    m.diffuse.absorbed = vec3(0.0);
     m.mirrored = m.diffuse;
     m.trapped = m.diffuse;
     m.albedo = vec3(0.0);
     m.passed = vec3(1.0);
+    m.absorbed = vec3(0.0);
     m.gloss = vec3(0.0);
     m.alpha2 = 0.0;
     m.ior = 1.0;
@@ -175,6 +187,7 @@ Underside mix_underside(Underside a, Underside b, vec3 share) {
     Underside u;
     u.back = mix(a.back, b.back, share);
     u.leaving = mix(a.leaving, b.leaving, share);
+    u.absorbed = mix(a.absorbed, b.absorbed, share);
     return u;
 }
 
@@ -188,14 +201,16 @@ Path open_path() {
     return path;
 }
 
-// A medium that lets `through` pass of diffuse light and reflects `reflected`, under an interface that lets `leaving`
-// out.
-Underside underside_of(vec3 leaving, vec3 reflected, vec3 through) {
-    vec3 kept = vec3(1.0) - reflected;
-    vec3 between = vec3(1.0) / max(kept + leaving * reflected, vec3(1e-9));
+// A medium that lets `through` pass of diffuse light, takes `absorbed` and reflects the rest, `reflected`, under an
+// interface that lets `leaving` out and throws the rest, `inwards`, back.
+Underside underside_of(vec3 leaving, vec3 inwards, vec3 reflected, vec3 through, vec3 absorbed) {
+    vec3 kept = through + absorbed;
+    vec3 between = vec3(1.0) / max(kept + leaving * reflected, vec3(1e-30));
+    vec3 down = inwards * between;
     Underside u;
-    u.back = min(reflected + through * through * (vec3(1.0) - leaving) * between, vec3(1.0));
+    u.back = min(reflected + through * through * down, vec3(1.0));
     u.leaving = kept * leaving * between;
+    u.absorbed = absorbed * (kept + through) * down;
     return u;
 }
 
@@ -203,49 +218,64 @@ Underside underside_of(vec3 leaving, vec3 reflected, vec3 through) {
 Matter base_matter(Slab slab, float cos_view) {
     Matter m = no_matter();
     m.coverage = slab_coverage(slab, cos_view);
+    m.bare = slab_bare(slab, cos_view);
     m.cos_view = cos_view;
     m.alpha2 = square(square(slab.roughness));
     m.ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
     m.under_interface = saturated(largest(slab.f0) / smallest_reflectance);
     vec3 leaving = internal_transmittance(slab);
-    vec3 albedo = slab.albedo;
-    vec3 out_of_medium = vec3(0.0);
+    vec3 inwards = internal_reflectance(slab);
+    // Of the medium, and of the medium under its interface.
     vec3 reflected = slab.albedo;
     vec3 through = vec3(0.0);
+    vec3 absorbed = vec3(1.0) - slab.albedo;
+    vec3 albedo = reflected;
+    vec3 passed = through;
+    vec3 lost = absorbed;
     vec3 scattered = vec3(1.0);
     m.transmittance = vec3(0.0);
+    m.scattered = scattered;
 #ifdef NACRE_SLAB_MEDIUM
     if ((slab.features & slab_medium) != 0u) {
         MediumScattering medium = slab_scattering(slab, mean_cosine);
         reflected = medium.reflected;
         through = medium.through + medium.straight;
+        absorbed = medium.absorbed;
         scattered = medium.through / max(through, vec3(1e-30));
-        vec3 upwards = upwards_in_medium(reflected, leaving, reflected);
-        albedo = min(upwards * leaving, vec3(1.0));
-        out_of_medium = through * (vec3(1.0) + upwards * (vec3(1.0) - leaving));
+        vec3 between = vec3(1.0) / max(medium.kept + leaving * reflected, vec3(1e-30));
+        albedo = min(reflected * leaving * between, vec3(1.0));
+        passed = through * between;
+        lost = absorbed * between;
+        m.scattered = scattered * (1.0 - max(slab.phase_anisotropy, 0.0));
         m.transmittance =
-            exp(log(clamp(through / max(vec3(1.0) - reflected, vec3(1e-6)), vec3(1e-30), vec3(1.0))) * mean_cosine);
+            exp(log(clamp(through / max(medium.kept, vec3(1e-30)), vec3(1e-30), vec3(1.0))) * mean_cosine);
     }
-#endif
-#ifdef NACRE_SLAB_MEDIUM
-    m.scattered = scattered * (1.0 - max(slab.phase_anisotropy, 0.0));
 #endif
     Fresnel fresnel = slab_fresnel(slab);
     vec3 mean = fresnel_mean(fresnel);
-    m.albedo = mean + (vec3(1.0) - mean) * albedo;
-    m.passed = (vec3(1.0) - mean) * out_of_medium;
+    vec3 entering = fresnel_mean_transmittance(fresnel);
+    m.albedo = mean + entering * albedo;
+    m.passed = entering * passed;
+    m.absorbed = entering * lost;
     m.gloss = mean / max(m.albedo, vec3(1e-30));
-    m.diffuse = underside_of(leaving, reflected, through);
+    m.diffuse = underside_of(leaving, inwards, reflected, through, absorbed);
     // Light that was scattered on its way in is diffuse when it comes back.
     m.mirrored =
-        mix_underside(underside_of(fresnel_transmittance(fresnel, cos_view), reflected, through), m.diffuse, scattered);
+        mix_underside(underside_of(fresnel_transmittance(fresnel, cos_view), fresnel_reflectance(fresnel, cos_view),
+                                   reflected, through, absorbed),
+                      m.diffuse, scattered);
     // A fit: 0.124 at index 1.5, for lobes so narrow that they hardly let anything escape that was reflected once.
-    m.trapped = mix_underside(underside_of(exp(log(leaving) * 2.3), reflected, through), m.diffuse, scattered);
+    vec3 steps = 2.3 * vec3(minus_log_rest(inwards.x), minus_log_rest(inwards.y), minus_log_rest(inwards.z));
+    m.trapped = mix_underside(
+        underside_of(exp(-steps), vec3(exponential_rest(steps.x), exponential_rest(steps.y), exponential_rest(steps.z)),
+                     reflected, through, absorbed),
+        m.diffuse, scattered);
 #ifdef NACRE_SLAB_FUZZ
     if ((slab.features & slab_fuzz) != 0u) {
         float fuzz = slab.fuzz_amount * sheen_albedo(mean_cosine, slab.fuzz_roughness);
         m.albedo = mix(m.albedo, slab.fuzz_color, fuzz);
         m.passed *= 1.0 - fuzz;
+        m.absorbed = mix(m.absorbed, vec3(1.0) - slab.fuzz_color, fuzz);
     }
 #endif
     return m;
@@ -267,6 +297,7 @@ struct Bounces {
     vec3 leaving;   // of what the base reflects, by its first reflection
     vec3 arriving;  // at the base, by what arrives there first
     vec3 spread;    // share of `leaving` that the first reflection's lobe does not hold any more
+    vec3 absorbed;  // of what arrives at the base first, by base, underside and Matter::transmittance of what leaves
 };
 
 Bounces bounces_between(Matter top, Matter base) {
@@ -280,8 +311,7 @@ Bounces bounces_between(Matter top, Matter base) {
     Underside returning = mix_underside(top.diffuse, top.trapped, narrow);
     Underside later = mix_underside(top.diffuse, mix_underside(top.mirrored, returning, width_later), base.gloss);
     // 1 - back * albedo by positive terms: nothing is lost where both are 1.
-    vec3 left = later.leaving + max(vec3(1.0) - later.back - later.leaving, vec3(0.0)) +
-                later.back * (vec3(1.0) - base.albedo) + vec3(1e-9);
+    vec3 left = later.leaving + later.absorbed + later.back * (base.passed + base.absorbed) + vec3(1e-9);
     vec3 again = first.back * base.albedo;
     Bounces bounces;
     vec3 again_leaving = again * (later.leaving + vec3(1e-9)) / left;
@@ -289,16 +319,23 @@ Bounces bounces_between(Matter top, Matter base) {
     // Light that was thrown back still leaves about along the lobe for more than a half (by random walks as well).
     bounces.spread = 0.4 * width_later * again_leaving / max(bounces.leaving, vec3(1e-30));
     bounces.arriving = vec3(1.0) + again / left;
+    // 1 - albedo * leaving * transmittance - passed * arriving, multiplied out.
+    vec3 taken = vec3(1.0) - top.transmittance;
+    bounces.absorbed =
+        base.absorbed +
+        base.albedo * (first.leaving * taken + first.absorbed +
+                       first.back / left * (base.absorbed + base.albedo * (later.absorbed + later.leaving * taken)));
     return bounces;
 }
 
 // Of what lies below, seen through matter that covers only a part.
-vec3 matter_throughput(Matter m) { return vec3(1.0 - m.coverage) + m.coverage * m.view_transmittance; }
+vec3 matter_throughput(Matter m) { return vec3(m.bare) + m.coverage * m.view_transmittance; }
 
 // Coverage with an amount: less of the same matter.
 Matter cover_matter(Matter m, float amount) {
     Matter covered = m;
     covered.coverage = m.coverage * amount;
+    covered.bare = (1.0 - amount) + m.bare * amount;
     return covered;
 }
 
@@ -318,6 +355,7 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     float covered_b = amount * b.coverage;
     Matter m = no_matter();
     m.coverage = covered_a + covered_b;
+    m.bare = (1.0 - amount) * a.bare + amount * b.bare;
     if (m.coverage <= 0.0) return m;
     float share = covered_b / m.coverage;
     m.transmittance = mix(a.transmittance, b.transmittance, share);
@@ -327,6 +365,7 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     m.trapped = mix_underside(a.trapped, b.trapped, vec3(share));
     m.albedo = mix(a.albedo, b.albedo, share);
     m.passed = mix(a.passed, b.passed, share);
+    m.absorbed = mix(a.absorbed, b.absorbed, share);
     m.gloss = gloss_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
     m.alpha2 = alpha2_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
     m.ior = mix(a.ior, b.ior, share);
@@ -338,21 +377,27 @@ Matter mix_matter(Matter a, Matter b, float amount) {
 
 // The undersides of two layers, by the shares of the surface where the top, the base and both are.
 Underside layer_underside(Underside top, Underside base, Matter base_matter, float t, float b, float tb) {
-    vec3 between = vec3(1.0) / max(vec3(1.0) - base_matter.albedo * top.back, vec3(1e-6));
+    // 1 - albedo * back by positive terms.
+    vec3 between = vec3(1.0) / max(top.leaving + top.absorbed + top.back * (base_matter.passed + base_matter.absorbed),
+                                   vec3(1e-30));
     vec3 back = base.back + base.leaving * base_matter.transmittance * top.back * base_matter.passed * between;
+    vec3 taken = base_matter.absorbed + base_matter.passed * (vec3(1.0) - base_matter.transmittance);
+    vec3 absorbed = base.absorbed + base.leaving * between * (top.absorbed + top.back * taken);
     Underside u;
     u.back = t * top.back + b * base.back + tb * min(back, vec3(1.0));
     u.leaving = t * top.leaving + b * base.leaving + tb * min(base.leaving * top.leaving * between, vec3(1.0));
+    u.absorbed = t * top.absorbed + b * base.absorbed + tb * min(absorbed, vec3(1.0));
     return u;
 }
 
 // One above the other, lying independently: both on C_t C_b of the surface, either alone on the rest.
 Matter layer_matter(Matter top, Matter base) {
     float both = top.coverage * base.coverage;
-    float only_top = top.coverage * (1.0 - base.coverage);
-    float only_base = (1.0 - top.coverage) * base.coverage;
+    float only_top = top.coverage * base.bare;
+    float only_base = top.bare * base.coverage;
     Matter m = no_matter();
     m.coverage = both + only_top + only_base;
+    m.bare = top.bare * base.bare;
     if (m.coverage <= 0.0) return m;
     float t = only_top / m.coverage;
     float b = only_base / m.coverage;
@@ -368,13 +413,13 @@ Matter layer_matter(Matter top, Matter base) {
     m.trapped = layer_underside(top.trapped, base.trapped, base, t, b, tb);
     m.albedo = t * top.albedo + b * base.albedo + tb * min(top.albedo + below, vec3(1.0));
     m.passed = t * top.passed + b * base.passed + tb * min(passed, vec3(1.0));
+    m.absorbed = t * top.absorbed + b * base.absorbed + tb * (top.absorbed + top.passed * bounces.absorbed);
     vec3 of_top = (t + tb) * top.albedo;
     vec3 of_base = b * base.albedo + tb * below;
     m.gloss = gloss_of_both(top, of_top, base, of_base);
     m.alpha2 = alpha2_of_both(top, of_top, base, of_base);
-    float only_above = (1.0 - top.under_interface * (t + tb)) * (1.0 - base.under_interface * (b + tb));
-    m.under_interface = 1.0 - only_above;
-    m.scattered = vec3(1.0) - (vec3(1.0) - top.scattered * (t + tb)) * (vec3(1.0) - base.scattered * (b + tb));
+    m.under_interface = either(top.under_interface * (t + tb), base.under_interface * (b + tb));
+    m.scattered = either(top.scattered * (t + tb), base.scattered * (b + tb));
     m.ior = mix(1.0, top.ior, t + tb) * mix(1.0, base.ior, b + tb);
     m.cos_view = base.cos_view;
     return m;
@@ -390,7 +435,7 @@ Path path_through_mix(Path path, float amount) {
 // A path that comes up from the base of a layer under `top`; `base` is all that lies below the top, to the bottom of
 // the material: light that is thrown back may hit any part of it.
 Path path_through_layer(Path path, Matter top, Matter base) {
-    vec3 beside = vec3(1.0 - top.coverage);
+    vec3 beside = vec3(top.bare);
     Bounces bounces = bounces_between(top, base);
     vec3 through = top.coverage * top.view_transmittance * bounces.leaving;
     vec3 sum = beside + through;
@@ -399,10 +444,11 @@ Path path_through_layer(Path path, Matter top, Matter base) {
     Path above;
     above.weight = path.weight * sum;
     // Scattered on its way to the base or on its way back.
-    vec3 sharp = (vec3(1.0) - bounces.spread) * (vec3(1.0) - top.scattered) * (vec3(1.0) - top.scattered);
-    above.spread = vec3(1.0) - (vec3(1.0) - path.spread) * mix(sharp, vec3(1.0), by);
-    above.under_interface =
-        1.0 - (1.0 - path.under_interface) * (1.0 - top.under_interface * (1.0 - dot(by, vec3(1.0 / 3.0))));
+    vec3 blurred = either(bounces.spread, either(top.scattered, top.scattered));
+    above.spread = either(path.spread, blurred * through / max(sum, vec3(1e-30)));
+    // One number for all channels: by what each lets through, since what another would see does not matter.
+    float covered_share = dot(through, vec3(1.0)) / max(dot(sum, vec3(1.0)), 1e-30);
+    above.under_interface = either(path.under_interface, top.under_interface * covered_share);
     above.uncovered = path.uncovered * by;
     // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
     // that stands for both is between.

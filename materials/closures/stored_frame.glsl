@@ -4,7 +4,7 @@
 #include "materials/closures/octahedral.glsl"
 #include "materials/closures/stored_fields.glsl"
 #ifdef NACRE_SLAB_MEDIUM
-#include "materials/closures/medium.glsl"
+#include "materials/closures/medium_inputs.glsl"
 #endif
 // Tangent frames and subsurface data of stored materials. A tangent is stored as the angle to one that follows from the
 // normal; lobes look the same turned by half a turn, so that half a turn is enough.
@@ -46,7 +46,7 @@ vec3 to_frame(StoredFrame frame, vec3 v) {
 // Views from behind a shading normal are moved onto the surface.
 vec3 view_in_frame(StoredFrame frame, vec3 to_viewer) {
     vec3 view = to_frame(frame, to_viewer);
-    return normalize(vec3(view.xy, max(view.z, 1e-4)));
+    return normalize(vec3(view.x, view.y, max(view.z, 1e-4)));
 }
 
 // normal: as the reader will have it.

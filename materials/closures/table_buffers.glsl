@@ -5,22 +5,22 @@
 // includes this has declared uint interface_words[] and, where slabs have the features, anisotropy_words[] and
 // medium_words[]. Reading them interpolated is the same on every device, which a texture's filter is not.
 #ifndef interface_pair
-#define interface_pair(at) uvec2(interface_words[2 * (at)], interface_words[2 * (at) + 1])
+#define interface_pair(entry, column, row) \
+    uvec2(interface_words[(entry).y * 128 + (entry).x * 2 + ((row) * 128 + (column) * 2)], \
+          interface_words[(entry).y * 128 + (entry).x * 2 + ((row) * 128 + (column) * 2 + 1)])
 #define anisotropy_word(at) anisotropy_words[at]
 #define medium_word(at) medium_words[at]
 #endif
 
-vec4 interface_entry(int column, int row) {
-    uvec2 pair = interface_pair(row * 64 + column);
-    return vec4(unpackUnorm2x16(pair.x), unpackUnorm2x16(pair.y));
-}
+vec4 interface_entry(uvec2 pair) { return vec4(unpackUnorm2x16(pair.x), unpackUnorm2x16(pair.y)); }
 
 vec4 interface_table(vec2 at) {
     vec2 place = clamp(at, vec2(0.0), vec2(1.0)) * vec2(63.0, 95.0);
     ivec2 entry = min(ivec2(place), ivec2(62, 94));
     vec2 part = place - vec2(entry);
-    return mix(mix(interface_entry(entry.x, entry.y), interface_entry(entry.x + 1, entry.y), part.x),
-               mix(interface_entry(entry.x, entry.y + 1), interface_entry(entry.x + 1, entry.y + 1), part.x), part.y);
+    return mix(mix(interface_entry(interface_pair(entry, 0, 0)), interface_entry(interface_pair(entry, 1, 0)), part.x),
+               mix(interface_entry(interface_pair(entry, 0, 1)), interface_entry(interface_pair(entry, 1, 1)), part.x),
+               part.y);
 }
 
 #ifdef NACRE_SLAB_MEDIUM

@@ -163,8 +163,9 @@ inline std::vector<double> medium_table_slice(std::uint32_t slice) {
             while (layer.depth() < std::exp2(-8.0 + 0.5 * row) * 0.999) layer.twice();
             for (std::uint32_t column = 0; column < medium_table_columns; ++column) {
                 const double out = layer.reflected(column) + layer.through(column);
-                result[2 * (row * medium_table_columns + column)] = layer.reflected(column) / out;
-                result[2 * (row * medium_table_columns + column) + 1] = out / (layer.interacting(column) * albedo);
+                result[2 * (row * medium_table_columns + column)] = layer.through(column) / out;
+                result[2 * (row * medium_table_columns + column) + 1] =
+                    1.0 - out / (layer.interacting(column) * albedo);
             }
         }
     }

@@ -38,10 +38,11 @@ class Emission final : public RenderPass {
                  .textures = texture_bit(TextureSlot::emission),
                  .depth_stencil = state,
                  .color_targets = {target},
-                 .frame_layout = context.camera_layout};
+                 .frame_layout = context.camera_layout,
+                 .closure_shader = "passes/closures/emission_"};
         if (packed_) desc_.defines.push_back({"PACKED"});
         selected_ = select_draws(context.geometry, [](const Draw& draw) {
-            return draw.alpha_mode != materials::AlphaMode::blend && draw.features.emits;
+            return draw.alpha_mode != materials::AlphaMode::blend && draw.emits;
         });
         group_ = context.camera_group;
         PassDeclaration pass = context.graph.add_pass(name);

@@ -16,7 +16,8 @@ layout(set = 1, binding = 9) uniform usampler2D medium_texels;
 layout(set = 1, binding = 10) uniform usampler2D anisotropy_texels;
 #endif
 #ifdef NACRE_SLAB_SPECULAR_LUT
-vec3 specular_lut(uint index, vec2 at) { return vec3(1.0); }
+layout(set = 1, binding = 11) uniform usampler2D specular_texels;
+#include "materials/closures/specular_tables.glsl"
 #endif
 #include "passes/shared/closure_lighting.glsl"
 #elif defined(SLAB)
@@ -39,10 +40,10 @@ layout(set = 1, binding = 7) uniform usampler2D emission;
 #ifdef CLOSURES
 #ifdef MATERIAL_SLICES
 #if MATERIAL_SLICES > 1
-layout(set = 1, binding = 11) uniform usampler2DArray material_slices;
+layout(set = 1, binding = 12) uniform usampler2DArray material_slices;
 #define fetch_slice(pixel, slice) texelFetch(material_slices, ivec3(pixel, slice), 0).r
 #else
-layout(set = 1, binding = 11) uniform usampler2D material_slices;
+layout(set = 1, binding = 12) uniform usampler2D material_slices;
 #define fetch_slice(pixel, slice) texelFetch(material_slices, pixel, 0).r
 #endif
 #endif

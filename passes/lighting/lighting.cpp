@@ -96,7 +96,7 @@ class Lighting final : public RenderPass {
                 for (std::uint32_t table = 1; table < closure_table_count; ++table) {
                     if (reads_table(context.closures.lighting().features, table)) add(8 + table, context.materials.table(table));
                 }
-                if (resources_.material_slices) add(11, graph.texture(resources_.material_slices));
+                if (resources_.material_slices) add(8 + closure_table_count, graph.texture(resources_.material_slices));
             }
             entries.push_back({.binding = 4, .buffer = graph.buffer(resources_.tile_lists)});
             bindings.push_back({.binding = 4, .type = rhi::BindingType::readonly_storage_buffer});

@@ -10,7 +10,9 @@ struct SurfaceFrames {
     vec3 tangents[tree_frame_count];
 };
 
+// Comes first: it also reads the texels that several fields share.
 SurfaceFrames surface_frames() {
+    read_shared_texels();
     SurfaceFrames frames;
     for (uint i = 0u; i < tree_frame_count; ++i) {
         vec3 normal = unit_or(in_normal, vec3(0.0, 1.0, 0.0));

@@ -31,25 +31,29 @@ vec3 closure_radiance(Slab slab, Path path, StoredFrame frame, LitPoint point
                       , LightVisibility visibility
 #endif
 ) {
-    if (largest(path.weight) <= 0.0) return vec3(0.0);
-    vec3 view = view_in_frame(frame, point.to_viewer);
-    Closure closure = cover_closure(prepare_lit_closure(slab, slab_fresnel(slab), view, point.footprint), path.spread,
-                                    path.under_interface);
-    ClosureValue surroundings = environment_value(slab, closure, frame, point);
-    vec3 result = surroundings.specular * top_transmittance(path, view.z) +
-                  (surroundings.diffuse + surroundings.subsurface) * top_transmittance(path, mean_cosine);
+    vec3 result = vec3(0.0);
+    if (largest(path.weight) > 0.0) {
+        vec3 view = view_in_frame(frame, point.to_viewer);
+        Closure closure = cover_closure(prepare_lit_closure(slab, slab_fresnel(slab), view, point.footprint),
+                                        path.spread, path.under_interface);
+        ClosureValue surroundings = environment_value(slab, closure, frame, point);
+        result = surroundings.specular * top_transmittance(path, view.z) +
+                 (surroundings.diffuse + surroundings.subsurface) * top_transmittance(path, mean_cosine);
 #ifdef LIGHTS
-    for (uint i = 0u; i < light_count.x; ++i) {
-        vec3 to_light;
-        float distance_to_light;
-        vec3 incident = incident_light(lights[i], point.position, to_light, distance_to_light) * visibility.share[i];
-        if (largest(incident) <= 0.0) continue;
-        vec3 light = to_frame(frame, to_light);
-        ClosureValue value = evaluate_closure(closure, light);
-        result += incident * top_transmittance(path, max(light.z, 0.0)) *
-                  (value.specular + value.diffuse + value.subsurface);
-    }
+        bool is_covered = min(path.uncovered.x, min(path.uncovered.y, path.uncovered.z)) < 1.0;
+        for (uint i = 0u; i < light_count.x; ++i) {
+            vec3 to_light;
+            float distance_to_light;
+            vec3 incident =
+                incident_light(lights[i], point.position, to_light, distance_to_light) * visibility.share[i];
+            if (largest(incident) <= 0.0) continue;
+            vec3 light = to_frame(frame, to_light);
+            if (is_covered) incident *= top_transmittance(path, max(light.z, 0.0));
+            ClosureValue value = evaluate_closure(closure, light);
+            result += incident * (value.specular + value.diffuse + value.subsurface);
+        }
 #endif
+    }
     return result * path.weight;
 }
 

@@ -9,7 +9,7 @@
 layout(set = 1, binding = 0, std140) uniform MaterialBlock { uvec4 rows[8]; } material_block;
 #define material_row(row) material_block.rows[row]
 #ifdef MATERIAL_SIDEBAND
-layout(set = 1, binding = 4, std140) uniform MaterialSideband { vec4 rows[MATERIAL_SIDEBAND]; } material_sideband;
+layout(set = 1, binding = 5, std140) uniform MaterialSideband { vec4 rows[MATERIAL_SIDEBAND]; } material_sideband;
 #define sideband_row(row) material_sideband.rows[row]
 #endif
 #include "passes/shared/material_blob.glsl"
@@ -29,7 +29,7 @@ vec2 moved_uv(int set, int slot) {
 // Whether texture `slot` is read is known when a draw's shader is made.
 #define WHERE_TEXTURE(slot)
 #define DRAW_TEXTURE(slot, name, set_of_uv) \
-    layout(set = 1, binding = 5 + slot) uniform sampler2D name##_texture; \
+    layout(set = 1, binding = 6 + slot) uniform sampler2D name##_texture; \
     vec4 name##_texel() { return texture(name##_texture, moved_uv(set_of_uv, slot)); }
 #ifdef BASE_COLOR_TEXTURE
 DRAW_TEXTURE(0, base_color, BASE_COLOR_TEXTURE)

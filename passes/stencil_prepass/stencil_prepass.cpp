@@ -26,7 +26,7 @@ class StencilPrepass final : public RenderPass {
                  .depth_stencil = state,
                  .frame_layout = context.camera_layout};
         selected_ = select_draws(context.geometry, [](const Draw& draw) {
-            return draw.alpha_mode != materials::AlphaMode::blend && draw.features.emits;
+            return draw.alpha_mode != materials::AlphaMode::blend && draw.emits;
         });
         group_ = context.camera_group;
         PassDeclaration pass = context.graph.add_pass(name);

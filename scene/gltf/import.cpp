@@ -14,6 +14,7 @@
 #include "scene/gltf/material.h"
 #include "scene/gltf/node.h"
 #include "scene/gltf/primitive.h"
+#include "scene/gltf/volume_scale.h"
 #include "scene/load.h"
 
 namespace nacre::scene {
@@ -49,6 +50,7 @@ class Importer {
         }
 
         for (ImportedMaterial& material : materials_) scene_.materials.push_back(std::move(material.description));
+        scale_volumes(scene_);
         scene_.images = images_.load(document_);
         scene_.environment = studio_environment();
         if (scene_.cameras.empty()) scene_.cameras.push_back(framing_camera(world_bounds(scene_)));

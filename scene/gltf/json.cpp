@@ -8,6 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "core/text_position.h"
 #include "scene/gltf/failure.h"
 
 namespace nacre::scene::gltf {
@@ -65,10 +66,8 @@ class Builder final : public nlohmann::json_sax<json> {
         if (reason.starts_with("parse error")) {
             if (const auto end = reason.find(": "); end != std::string::npos) reason.erase(0, end + 2);
         }
-        const std::string_view before = text_.substr(0, position == 0 ? 0 : position - 1);
-        const auto line = 1 + std::count(before.begin(), before.end(), '\n');
-        const auto column = before.size() - (before.rfind('\n') == before.npos ? 0 : before.rfind('\n') + 1) + 1;
-        reject(fmt::format("the JSON text is wrong at line {}, column {}: {}", line, column, printable(reason, 300)));
+        const TextPosition at = text_position(text_, position == 0 ? 0 : position - 1);
+        reject(fmt::format("the JSON text is wrong at line {}, column {}: {}", at.line, at.column, printable(reason, 300)));
     }
 
   private:

@@ -35,13 +35,14 @@ TEST(DescriptionTree, MetalAndDielectric) {
     const FlattenedTree metal = flat(material);
     EXPECT_EQ(only_slab(metal).f0, glm::vec3(0.8f, 0.4f, 0.2f));
     EXPECT_EQ(only_slab(metal).albedo, glm::vec3(0.0f));
-    // In between one closure stands for both, about half as diffuse as the dielectric.
+    // In between one closure stands for both: its medium gets less light and sends out what half of the dielectric's
+    // does.
     material.metallic = 0.5f;
     const FlattenedTree between = flat(material);
     ASSERT_EQ(between.topology.closures.size(), 1u);
     const ShadedTree shaded = shade(between, {0.0, 0.0, 1.0});
     EXPECT_NEAR(shaded.closures[0].slab.f0.x, 0.5 * (0.04 + 0.8), 1e-6);
-    EXPECT_NEAR(shaded.closures[0].slab.albedo.x, 0.4, 1e-6);
+    EXPECT_NEAR(shaded.closures[0].slab.albedo.x, 0.5 * 0.8 * (1.0 - 0.04) / (1.0 - 0.5 * (0.04 + 0.8)), 1e-6);
 }
 
 // Both widths of the lobe are those of glTF's definition, alpha_t = mix(alpha, 1, strength^2) and alpha_b = alpha.

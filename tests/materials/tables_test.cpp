@@ -123,7 +123,8 @@ TEST(MediumTable, BetweenEntriesTheErrorIsSmall) {
         const auto infinite = library.medium_table({std::sqrt(cosine), 1.0, std::sqrt(similarity)});
         const double turn =
             similarity > 0.0
-                ? std::lerp(1.0, albedo / ((1.0 - similarity * similarity) * infinite.y + 1e-30), scattering.opaque)
+                ? std::lerp(1.0, albedo / ((1.0 - similarity * similarity) * (1.0 - infinite.y) + 1e-30),
+                            scattering.opaque)
                 : 1.0;
         reflected = std::max(reflected, std::abs(scattering.reflected / turn - layer.reflected(0)));
         through = std::max(through, std::abs(scattering.through - layer.through(0)));

@@ -4,12 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <sstream>
 
+#include "materials/building_blocks.h"
 #include "materials/topology.h"
 
 namespace nacre::materials {
@@ -74,7 +76,8 @@ TEST(TreeJson, TextRoundTrips) {
         const int slabs = 1 + static_cast<int>(uniform() * 6.0f);
         for (int i = 0; i < slabs; ++i) {
             Slab slab;
-            slab.features = random() & ((1u << 11) - 1) & ~slab_specular_lut;
+            slab.features = random() & ((1u << 11) - 1);
+            if ((slab.features & slab_specular_lut) != 0) slab.specular_lut = random() % 256;
             for (const SlabField& field : slab_fields()) {
                 if (field.feature != 0 && (slab.features & field.feature) == 0) continue;
                 for (std::uint32_t channel = 0; channel < field.channels; ++channel) {
@@ -90,6 +93,10 @@ TEST(TreeJson, TextRoundTrips) {
                                                      .channel = 3,
                                                      .scale = uniform(),
                                                      .bias = uniform()});
+            if (uniform() < 0.3f)
+                tree.nodes[node].textures.push_back(
+                    {.field = "f0", .texture = {.image = 0, .sampler = 0}, .channel = 2, .gray = true});
+            if (uniform() < 0.3f) tree.nodes[node].vertex_colored.emplace_back("albedo");
             open.push_back(node);
         }
         while (open.size() > 1) {
@@ -116,7 +123,8 @@ TEST(TreeJson, TextRoundTrips) {
         ASSERT_EQ(got.size(), expected.size());
         for (std::size_t i = 0; i < got.size(); ++i) {
             EXPECT_EQ(got[i].slab, expected[i].slab);
-            EXPECT_EQ(got[i].textures, expected[i].textures);
+            EXPECT_THAT(got[i].textures, testing::UnorderedElementsAreArray(expected[i].textures));
+            EXPECT_EQ(got[i].vertex_colored, expected[i].vertex_colored);
             EXPECT_EQ(got[i].amount, expected[i].amount);
             EXPECT_EQ(got[i].thickness, expected[i].thickness);
             EXPECT_EQ(got[i].name, expected[i].name);
@@ -157,6 +165,71 @@ TEST(TreeJson, FaultsAreNamedWithTheirPlace) {
     EXPECT_THAT(load_material("no such file.json").error().message(), HasSubstr("no such file.json"));
 }
 
+// Blocks are nodes like others.
+TEST(TreeJson, BuildingBlocksAreNodes) {
+    const auto file = parse_material(R"({"nacre_material": 1, "images": ["a.png"], "frames": [{}, {"rotation": 1}],
+        "root": {"mix": {"first": {"coated_layer": {"name": "lacquered", "coat_color": [1, 0.5, 0.2], "coat_frame": 1,
+                                                    "base": {"slab": {"name": "wood"}}}},
+                         "second": {"principled": {"base_color": {"value": [1, 0.5, 0.25], "texture": {"image": 0}},
+                                                   "specular": {"value": 0.5, "texture": {"image": 0, "channel": "g"}},
+                                                   "roughness": 0.25}},
+                         "amount": 0.5}}})",
+                                     "blocks.json");
+    ASSERT_TRUE(file) << file.error().message();
+    const Tree& tree = file->tree;
+    EXPECT_EQ(topology_text(tree), "mix(layer(colored coat, wood), dielectric)");
+    Tree expected{.name = ""};
+    add(expected, Principled{.base_color = {{1.0f, 0.5f, 0.25f}, {.texture = {.image = 0, .sampler = 0}}},
+                             .specular = {0.5f, {.texture = {.image = 0, .sampler = 0}, .channel = 1}},
+                             .roughness = 0.25f});
+    const Node& read = tree.nodes[tree.nodes[tree.root].second];
+    EXPECT_EQ(read.slab, expected.nodes[expected.root].slab);
+    const auto without_field = [](TextureInput input) {
+        input.field.clear();
+        return input;
+    };
+    ASSERT_EQ(read.textures.size(), 2u);
+    for (std::size_t i = 0; i < 2; ++i) {
+        EXPECT_EQ(read.textures[i].field, expected.nodes[expected.root].textures[i].field);
+        EXPECT_EQ(without_field(read.textures[i]), without_field(expected.nodes[expected.root].textures[i]));
+    }
+    EXPECT_EQ(tree.nodes[tree.nodes[tree.root].first].name, "lacquered");
+    EXPECT_EQ(tree.nodes[tree.nodes[tree.nodes[tree.root].first].first].frame, 1u);
+    // Written, it is slabs and operators; read again, the same.
+    const auto again = parse_material(material_text(*file), "again.json");
+    ASSERT_TRUE(again) << again.error().message();
+    EXPECT_EQ(material_text(*again), material_text(*file));
+    // Every block with nothing said is a material.
+    for (const BuildingBlock& block : building_blocks()) {
+        const std::string body = block.has_base ? R"({"base": {"slab": {}}})" : "{}";
+        EXPECT_TRUE(parse_material(R"({"nacre_material": 1, "root": {")" + std::string(block.name) + "\": " + body + "}}", "m"))
+            << block.name;
+    }
+}
+
+TEST(TreeJson, FaultsInBlocksAreNamed) {
+    const auto message = [](std::string_view node) {
+        const auto result = parse_material(
+            R"({"nacre_material": 1, "images": ["a.png"], "root": )" + std::string(node) + "}", "m.json");
+        return result ? std::string("no error") : result.error().message();
+    };
+    EXPECT_THAT(message(R"({"principle": {}})"), HasSubstr("principled"));
+    EXPECT_THAT(message(R"({"principled": {"base_colour": 1}})"), HasSubstr("unknown member 'base_colour'"));
+    EXPECT_THAT(message(R"({"principled": {"base_colour": 1}})"), HasSubstr("base_color"));
+    EXPECT_THAT(message(R"({"principled": {"metallic": 2}})"), HasSubstr("root.principled.metallic: it is 2. It must be in [0, 1]"));
+    EXPECT_THAT(message(R"({"principled": {"metallic": [0, 1, 0]}})"), HasSubstr("it has 3 numbers, not 1"));
+    EXPECT_THAT(message(R"({"principled": {"anisotropic": {"value": 1, "texture": {"image": 0}}}})"), HasSubstr("takes no texture"));
+    EXPECT_THAT(message(R"({"principled": {"frame": 1}})"), HasSubstr("index below 1"));
+    EXPECT_THAT(message(R"({"coated_layer": {}})"), HasSubstr("it has no 'base'"));
+    EXPECT_THAT(message(R"({"standard_surface_opaque": {"transmission_weight": 1}})"), HasSubstr("transmission_weight"));
+    EXPECT_THAT(message(R"({"standard_surface_opaque": {"specular_weight": {"texture": {"image": 0}},
+                                                        "specular_color": {"texture": {"image": 0}}}})"),
+                HasSubstr("'f0' has two textures"));
+    std::string deep;
+    for (int i = 0; i < 3000; ++i) deep += R"({"coated_layer": {"base": )";
+    EXPECT_THAT(message(deep + R"({"slab": {}})" + std::string(6000, '}')), HasSubstr("more than 16 operators"));
+}
+
 // Cut anywhere, the text is an error and nothing else.
 TEST(TreeJson, TruncatedTextIsRefused) {
     const std::string text = lacquer;
@@ -173,6 +246,13 @@ TEST(TreeJson, TheSchemaInTheTreeIsTheOneOfTheFormat) {
     EXPECT_TRUE(schema["$defs"]["texture"]["required"].is_array());
     const auto& slab = schema["$defs"]["node"]["oneOf"][0]["properties"]["slab"]["properties"];
     for (const SlabField& field : slab_fields()) EXPECT_TRUE(slab.contains(field.name)) << field.name;
+    const auto& kinds = schema["$defs"]["node"]["oneOf"];
+    for (const BuildingBlock& block : building_blocks()) {
+        const auto found = std::ranges::find_if(kinds, [&](const auto& kind) { return kind["properties"].contains(block.name); });
+        ASSERT_NE(found, kinds.end()) << block.name;
+        for (const BlockInput& input : block.inputs)
+            EXPECT_TRUE((*found)["properties"][std::string(block.name)]["properties"].contains(input.name)) << input.name;
+    }
 }
 
 }  // namespace

@@ -24,6 +24,7 @@ layout(set = 0, binding = 5, std430) readonly buffer AnisotropyTable { uint anis
 float tree_parameter(uint index) { return parameters[index]; }
 vec4 tree_texture(uint index) { return vec4(0.25, 0.5, 0.75, 1.0); }
 vec3 specular_lut(uint index, vec2 at) { return vec3(1.0); }
+#define NACRE_TREE_VERTEX_COLOR vec4(0.5, 0.25, 1.0, 0.5)
 )";
 
 }  // namespace

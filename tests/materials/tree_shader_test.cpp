@@ -91,20 +91,28 @@ TEST_P(TreeShaderTest, BlendsAsTheHostDoes) {
     }
 }
 
-TEST_P(TreeShaderTest, TexturesMultiplyTheirInputs) {
+TEST_P(TreeShaderTest, TexturesAndVertexColorsMultiplyTheirInputs) {
     Tree tree{.name = "textured"};
-    Slab slab{.roughness = 0.8f, .albedo = {0.5f, 0.25f, 1.0f}};
+    Slab slab{.f0 = {0.4f, 0.2f, 0.1f}, .roughness = 0.8f, .albedo = {0.5f, 0.25f, 1.0f}};
     const NodeIndex a = tree.add(slab), b = tree.add(slab);
     tree.mix(a, b, 0.5f);
     const TextureReference texture{.image = 0, .sampler = 0};
     tree.nodes[a].textures = {{.field = "roughness", .texture = texture, .channel = 1},
-                              {.field = "albedo", .texture = texture, .scale = -1.0f, .bias = 1.0f}};
+                              {.field = "albedo", .texture = texture, .scale = -1.0f, .bias = 1.0f},
+                              {.field = "f0", .texture = texture, .channel = 2, .gray = true}};
     tree.nodes[tree.root].textures = {{.field = "amount", .texture = texture, .channel = 2}};
+    tree.nodes[b].vertex_colored = {"albedo"};
+    tree.nodes[tree.root].vertex_colored = {"amount"};
     Tree plain = tree;  // what that comes to
-    for (Node& node : plain.nodes) node.textures.clear();
+    for (Node& node : plain.nodes) {
+        node.textures.clear();
+        node.vertex_colored.clear();
+    }
+    plain.nodes[b].slab.albedo = {0.25f, 0.0625f, 1.0f};
     plain.nodes[a].slab.roughness = 0.4f;
+    plain.nodes[a].slab.f0 = {0.3f, 0.15f, 0.075f};
     plain.nodes[a].slab.albedo = {0.375f, 0.125f, 0.25f};
-    plain.nodes[plain.root].amount = 0.375f;
+    plain.nodes[plain.root].amount = 0.1875f;
     std::mt19937 random(13);
     compare(*flatten(tree), *flatten(plain), random);
 }

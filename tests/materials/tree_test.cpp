@@ -156,6 +156,15 @@ TEST(Tree, FaultsAreNamed) {
     EXPECT_THAT(message(tree), HasSubstr("feature"));
     tree.nodes[a].textures[0] = {.field = "albedo", .texture = {.image = 0, .sampler = 0}, .channel = 2};
     EXPECT_THAT(message(tree), HasSubstr("3 channels from 2"));
+    tree.nodes[a].textures[0].gray = true;
+    EXPECT_EQ(message(tree), "");
+    tree.nodes[a].vertex_colored = {"albedo"};
+    EXPECT_EQ(message(tree), "");
+    for (const char* wrong : {"roughness", "fuzz_color", "amount", "colour"}) {
+        tree.nodes[a].vertex_colored = {wrong};
+        EXPECT_THAT(message(tree), HasSubstr(wrong));
+    }
+    tree.nodes[a].vertex_colored.clear();
 
     Tree deep{.name = "deep"};
     NodeIndex root = deep.add({});

@@ -26,13 +26,7 @@ TEST(Stability, ClosuresKeepTheirPromises) {
     const auto report = measure_stability(instance, {.backends = {"cpu"}, .points = 300'000});
     ASSERT_TRUE(report) << report.error().message();
     EXPECT_GE(report->closures.size(), 35u);
-    // What is known to be broken, and why: docs/stability.md, "What is open".
-    const auto is_known = [](const std::string& violation) {
-        return violation.starts_with("medium-thick: an error") || violation.starts_with("tree-deep: an error");
-    };
-    for (const std::string& violation : violations_of(*report)) {
-        if (!is_known(violation)) ADD_FAILURE() << violation;
-    }
+    for (const std::string& violation : violations_of(*report)) ADD_FAILURE() << violation;
     std::uint64_t points = 0;
     for (const StabilityClosure& c : report->closures) {
         points += c.all.points;

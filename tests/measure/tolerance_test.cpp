@@ -40,6 +40,7 @@ TEST(ToleranceTest, MembersAreRead) {
 
 TEST(ToleranceTest, ErrorsNameTheFileAndTheMember) {
     EXPECT_THAT(error_of("{"), HasSubstr("'t.json'"));
+    EXPECT_THAT(error_of("{\n  ,\n}"), HasSubstr("line 2, column 3"));
     EXPECT_THAT(error_of("[]"), HasSubstr("not an object"));
     EXPECT_THAT(error_of(R"({"psnr": 1})"), HasSubstr("psnr is unknown; known here: fields_differing"));
     EXPECT_THAT(error_of(R"({"final": {"psnr": 1}})"), HasSubstr("final.psnr is unknown"));

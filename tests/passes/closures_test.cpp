@@ -6,6 +6,7 @@
 
 #include "materials/builtin_materials.h"
 #include "materials/evaluation.h"
+#include "materials/specular_table.h"
 #include "materials/storage.h"
 #include "passes/gbuffer_layout.h"
 #include "scene/builtin.h"
@@ -51,9 +52,10 @@ glm::dmat3 frame_of(const glm::dvec3& normal, double angle) {
 // Every pixel of lit balls against the closures evaluated in double precision from the same words.
 TEST_P(Closures, LightingAgreesWithWhatIsStored) {
     Library library;
+    library.tints = materials::tints_of(materials::default_specular_tables());
     const passes::Field normal_field = *std::ranges::find(passes::gbuffer_fields(), "normal", &passes::Field::name);
     const passes::Field roughness_field = *std::ranges::find(passes::gbuffer_fields(), "roughness", &passes::Field::name);
-    for (const char* name : {"complex-coat", "silks-under-plastic", "single-sss"}) {
+    for (const char* name : {"complex-coat", "silks-under-plastic", "single-sss", "special-speclut"}) {
         scene::Scene scene = empty_scene();
         place(scene, ball(), add_material(scene, described(name)));
         scene::Light sun = directional_light({-0.4f, -0.8f, -1.0f}, 2.0f);
@@ -112,6 +114,62 @@ TEST_P(Closures, LightingAgreesWithWhatIsStored) {
         // Half floats have 11 bits; what is left is single precision.
         EXPECT_LT(worst, 3e-3) << name;
     }
+}
+
+// A mesh with colors looks like one whose material has them.
+TEST_P(Closures, VertexColorsMultiplyTheBaseColor) {
+    const glm::vec4 color(0.5f, 0.25f, 1.0f, 1.0f);
+    for (const float metallic : {0.0f, 0.6f, 1.0f}) {
+        const auto shot_of = [&](bool by_vertex) {
+            scene::Scene scene = empty_scene();
+            materials::MaterialDescription material{.name = "coated"};
+            material.metallic = metallic;
+            material.roughness = 0.5f;
+            material.clearcoat = materials::Clearcoat{.factor = 1.0f, .roughness = 0.2f};
+            if (!by_vertex) material.base_color = color;
+            scene::Primitive shape = ball();
+            if (by_vertex) shape.colors.assign(shape.positions.size(), color);
+            place(scene, shape, add_material(scene, material));
+            scene.lights.push_back(directional_light({-0.2f, -0.3f, -1.0f}, 2.0f));
+            return render(scene, {.width = side, .height = side, .exposure_ev = 0.0f});
+        };
+        const Shot by_vertex = shot_of(true), by_material = shot_of(false);
+        glm::vec3 sum(0.0f);
+        for (std::uint32_t i = 0; i < side * side; ++i) {
+            const glm::vec3 a = by_vertex.radiance_at(i % side, i / side), b = by_material.radiance_at(i % side, i / side);
+            for (int channel = 0; channel < 3; ++channel) ASSERT_NEAR(a[channel], b[channel], 0.02f * b[channel] + 2e-3f) << i;
+            sum += b;
+        }
+        EXPECT_GT(sum.b, 1.3f * sum.g);
+    }
+}
+
+// A scene's own tables tint what reflects: red alone, or nothing at all.
+TEST_P(Closures, ReflectionsHaveTheTintsOfTheScenesTables) {
+    const auto shot_of = [&](const glm::vec3& tint) {
+        scene::Scene scene = empty_scene();
+        materials::MaterialDescription material{.name = "tinted"};
+        materials::Tree tree{.name = "tinted"};
+        materials::Slab metal{.f0 = glm::vec3(0.9f), .roughness = 0.5f, .albedo = glm::vec3(0.0f)};
+        metal.features = materials::slab_specular_lut;
+        metal.specular_lut = 1;
+        tree.add(metal);
+        material.tree = std::make_shared<const materials::Tree>(tree);
+        place(scene, ball(), add_material(scene, material));
+        scene.lights.push_back(directional_light({-0.2f, -0.3f, -1.0f}, 2.0f));
+        scene.specular_tables.resize(2);
+        scene.specular_tables[1].entries.fill(tint);
+        const Shot shot = render(scene, {.width = side, .height = side, .exposure_ev = 0.0f});
+        glm::dvec3 sum(0.0);
+        for (std::uint32_t i = 0; i < side * side; ++i) sum += glm::dvec3(shot.radiance_at(i % side, i / side));
+        return sum;
+    };
+    if (GetParam().profile == "mobile") GTEST_SKIP() << "12 bytes hold no table";
+    const glm::dvec3 white = shot_of(glm::vec3(1.0f)), red = shot_of({0.5f, 0.0f, 0.0f}), black = shot_of(glm::vec3(0.0f));
+    EXPECT_GT(white.g, 10.0);
+    EXPECT_NEAR(red.r - black.r, 0.5 * (white.r - black.r), 0.01 * white.r);
+    EXPECT_NEAR(red.g, black.g, 1e-3 * white.g);
+    EXPECT_LT(black.r, 0.01 * white.r);
 }
 
 // A clear pane before a glowing one: what shows through is what the closures say that the view keeps.

@@ -1,4 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <memory>
+
+#include "materials/building_blocks.h"
+#include "materials/evaluation.h"
+#include "materials/simplification.h"
 #include "scene/shapes.h"
 #include "tests/passes/renderer_test.h"
 
@@ -26,6 +31,35 @@ TEST_P(Emission, IsAddedToWhatIsReflected) {
     EXPECT_NEAR(shot.radiance_at(16, 16).r, 4.25f, 0.02f);
     EXPECT_NEAR(shot.radiance_at(16, 16).g, 2.25f, 0.02f);
     EXPECT_NEAR(shot.radiance_at(16, 16).b, 0.25f, 5e-3f);
+}
+
+// Light from below a coat has its color, and that of a tree without the plain slab's emission is seen as well.
+TEST_P(Emission, IsTintedByTheLayersAbove) {
+    materials::Tree tree{.name = "lamp"};
+    materials::Slab glow{.albedo = glm::vec3(0.0f)};
+    glow.features = materials::slab_emission;
+    glow.emission = {4.0f, 2.0f, 3.0f};
+    const materials::NodeIndex base = tree.add(glow, "glow");
+    materials::add(tree, materials::CoatedLayer{.coat_color = {0.9f, 0.25f, 0.04f}, .coat_roughness = 0.3f}, base);
+    // Where a pixel holds no more than one plain slab, that stands for both, with the emission blended into it.
+    const bool is_plain = GetParam().profile == "mobile";
+    const auto simple = materials::simplify(tree, {.closures = is_plain ? 1u : 8u, .bytes = is_plain ? 12u : 256u});
+    ASSERT_TRUE(simple) << simple.error().message();
+    const auto flat = materials::flatten(simple->steps.back().tree, simple->steps.back().flatten);
+    ASSERT_TRUE(flat) << flat.error().message();
+    materials::MaterialDescription material{.name = "lamp"};
+    material.tree = std::make_shared<const materials::Tree>(tree);
+    scene::Scene scene = empty_scene();
+    place(scene, sheet(0.0f), add_material(scene, material));
+    const Shot shot = render(scene, {.width = 32, .height = 32, .exposure_ev = 0.0f});
+    glm::dvec3 expected(0.0);
+    for (const materials::ShadedClosure& closure : materials::shade(*flat, {0.0, 0.0, 1.0}).closures) {
+        if ((closure.slab.features & materials::slab_emission) != 0)
+            expected += closure.path.weight * closure.coverage * closure.slab.emission;
+    }
+    const glm::vec3 seen = shot.radiance_at(16, 16);
+    EXPECT_LT(expected.b, 1.0) << "the coat takes blue light";
+    for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(seen[channel], expected[channel], 0.01 * expected[channel]);
 }
 
 // Faces that coincide give their light once, and hidden ones none.

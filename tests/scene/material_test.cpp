@@ -267,5 +267,33 @@ TEST(Material, PicturesCanBeLeftUndecoded) {
     EXPECT_EQ(scene->images.at(0).width, 1u);
 }
 
+// The thickness of a volume is in the space of its mesh: placed twice as large, it is twice as thick.
+TEST(Material, VolumesGrowWithTheirNodes) {
+    GltfBuilder file;
+    file.json["materials"] = nlohmann::json::parse(
+        R"([{"extensions": {"KHR_materials_volume": {"thicknessFactor": 0.5, "attenuationDistance": 3}}}, {}])");
+    file.json["extensionsUsed"] = {"KHR_materials_volume"};
+    file.primitive()["material"] = 0;
+    file.json["meshes"].push_back(file.json["meshes"][0]);
+    file.json["meshes"][1]["primitives"][0]["material"] = 1;
+    file.json["nodes"] = nlohmann::json::parse(R"([{"mesh": 0}, {"mesh": 0, "scale": [2, 2, 2]}, {"mesh": 0, "scale": [-2, 2, 2]},
+        {"mesh": 0, "scale": [1, 3, 9]}, {"mesh": 1, "scale": [5, 5, 5]}])");
+    file.json["scenes"][0]["nodes"] = {0, 1, 2, 3, 4};
+    const auto scene = file.load();
+    ASSERT_TRUE(scene) << scene.error().message();
+    ASSERT_EQ(scene->instances.size(), 5u);
+    const auto volume_of = [&](std::size_t instance) {
+        return scene->materials[scene->meshes[scene->instances[instance].mesh].primitives[0].material].volume;
+    };
+    EXPECT_EQ(volume_of(0)->thickness, 0.5f);
+    EXPECT_NEAR(volume_of(1)->thickness, 1.0f, 1e-6f);
+    EXPECT_NEAR(volume_of(2)->thickness, 1.0f, 1e-6f) << "mirrored";
+    EXPECT_NEAR(volume_of(3)->thickness, 1.5f, 1e-6f) << "the cube root of 27";
+    EXPECT_EQ(volume_of(1)->attenuation_distance, 3.0f) << "that one is in the world";
+    EXPECT_EQ(scene->instances[1].mesh, scene->instances[2].mesh);
+    EXPECT_FALSE(volume_of(4));
+    EXPECT_EQ(scene->materials.size(), 4u) << "two scales more of the one with a volume";
+}
+
 }  // namespace
 }  // namespace nacre::scene

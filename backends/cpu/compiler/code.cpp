@@ -280,6 +280,7 @@ class OrcGenerator final : public CodeGenerator {
             symbols[jit_->mangleAndIntern(symbol)] = {llvm::orc::ExecutorAddr::fromPtr(function), llvm::JITSymbolFlags::Exported | llvm::JITSymbolFlags::Callable};
         };
         define("nacre_cpu_image", image_function(lanes_));
+        define("nacre_cpu_texel", texel_function());
         define("nacre_cpu_double_image", double_image_function());
         define("nacre_cpu_check_begin", check_begin_function());
         define("nacre_cpu_check_workgroup", check_workgroup_function());

@@ -114,6 +114,9 @@ std::vector<Component> Emitter::image_call(const Component& image, const Compone
     llvm::FunctionCallee function =
         external(function_symbol, builder.getVoidTy(),
                  {pointer_type, pointer_type, pointer_type, builder.getInt32Ty(), builder.getInt32Ty()});
+    // It comes back, so that what is the same for all batches behind it may be computed in front of their loop.
+    for (const auto attribute : {llvm::Attribute::NoUnwind, llvm::Attribute::WillReturn, llvm::Attribute::NoFree})
+        llvm::cast<llvm::Function>(function.getCallee())->addFnAttr(attribute);
     llvm::Value* lanes_on = writes ? effect_mask() : mask;
     const std::size_t results = operation == ImageOperation::store ? 0 : 4;
     const bool is_split = !image.is_uniform() || (sampler && !sampler.is_uniform());
@@ -350,8 +353,13 @@ bool Emitter::emit_image(const Instruction& at) {
         if (!may_be_direct || !store_directly(image.image, image.image_type, coordinates, texel, [&] { call(); })) call();
         return true;
     }
+    const bool is_one_texel = operation == ImageOperation::fetch && module.model == spv::ExecutionModel::Fragment &&
+                              type.dim != spv::Dim::Buffer &&
+                              std::ranges::all_of(coordinates, &Component::is_uniform);
     const std::vector<Component> words =
-        may_be_direct ? fetch_directly(image.image, image.image_type, coordinates, level, call) : call();
+        !may_be_direct ? call()
+        : is_one_texel ? fetch_once(image.image, image.image_type, coordinates, level, flags)
+                       : fetch_directly(image.image, image.image_type, coordinates, level, call);
     if (at.result) set(at, make_texel(words, at.type));
     return true;
 }

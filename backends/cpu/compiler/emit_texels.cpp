@@ -2,6 +2,7 @@
 #include <llvm/Analysis/VectorUtils.h>
 #include <llvm/IR/Constants.h>
 #include <llvm/IR/Intrinsics.h>
+#include <llvm/IR/MDBuilder.h>
 
 #include <algorithm>
 #include <bit>
@@ -19,6 +20,14 @@ namespace {
 
 /// 1.5 * 2^23: floats next to it are whole numbers apart, and the low bits of a sum with it are the number.
 constexpr float whole_numbers = 12582912.0f;
+
+/// Tells LLVM that one of the cases is almost always the one: what goes on then stays in registers and in one piece, and
+/// the call, which no vector register outlives, saves and restores what it must beside.
+void expect_cases(llvm::SwitchInst& which) {
+    std::vector<std::uint32_t> weights(which.getNumSuccessors(), 2000);
+    weights[0] = 1;  // the default
+    which.setMetadata(llvm::LLVMContext::MD_prof, llvm::MDBuilder(which.getContext()).createBranchWeights(weights));
+}
 
 }  // namespace
 
@@ -184,6 +193,7 @@ std::vector<Component> Emitter::fetch_directly(const Component& image, Id image_
         arrive(channels);
     }
 
+    expect_cases(*which);
     builder.SetInsertPoint(call);
     const std::vector<Component> called = otherwise();
     arrive({called.at(0).value, called.at(1).value, called.at(2).value, called.at(3).value});
@@ -196,6 +206,33 @@ std::vector<Component> Emitter::fetch_directly(const Component& image, Id image_
         result.emplace_back(either);
     }
     return result;
+}
+
+std::vector<Component> Emitter::fetch_once(const Component& image, Id image_type,
+                                           const std::vector<Component>& coordinates, const Component& level,
+                                           std::uint32_t flags) {
+    const Type& type = module.type(image_type);
+    llvm::Type *word = builder.getInt32Ty(), *pair = builder.getInt64Ty();
+    llvm::FunctionCallee callee = external("nacre_cpu_texel", llvm::StructType::get(context, {pair, pair}),
+                                           {pointer_type, word, word, word, word, word});
+    // No shader writes what it fetches, and no argument does harm: as arithmetic, it may be done earlier, once for many.
+    auto& function = *llvm::cast<llvm::Function>(callee.getCallee());
+    function.setMemoryEffects(llvm::MemoryEffects::none());
+    for (const auto attribute : {llvm::Attribute::NoUnwind, llvm::Attribute::WillReturn, llvm::Attribute::Speculatable,
+                                 llvm::Attribute::NoSync, llvm::Attribute::NoFree})
+        function.addFnAttr(attribute);
+    std::vector<llvm::Value*> arguments{bound_view(image.value)};
+    const std::uint32_t count = dimensions_of(type.dim) + (type.arrayed ? 1u : 0u);
+    for (std::uint32_t i = 0; i < 3; ++i) arguments.push_back(i < count ? coordinates.at(i).value : int32(0));
+    arguments.push_back(level.value);
+    arguments.push_back(int32(static_cast<std::int32_t>(flags)));
+    llvm::Value* texel = builder.CreateCall(callee, arguments);
+    std::vector<Component> words;
+    for (unsigned i = 0; i < 4; ++i) {
+        llvm::Value* two = builder.CreateExtractValue(texel, i / 2);
+        words.emplace_back(builder.CreateTrunc(i % 2 == 0 ? two : builder.CreateLShr(two, 32), word));
+    }
+    return words;
 }
 
 bool Emitter::store_directly(const Component& image, Id image_type, const std::vector<Component>& coordinates,
@@ -274,6 +311,7 @@ bool Emitter::store_directly(const Component& image, Id image_type, const std::v
         store_words(places, packed);
     }
 
+    expect_cases(*which);
     builder.SetInsertPoint(call);
     otherwise();
     builder.CreateBr(after);

@@ -286,6 +286,9 @@ class Emitter {
     std::vector<Component> fetch_directly(const Component& image, Id image_type,
                                           const std::vector<Component>& coordinates, const Component& level,
                                           const std::function<std::vector<Component>()>& otherwise);
+    /// The texel that all lanes ask for, in fragment shaders: a value that LLVM may compute once for all batches.
+    std::vector<Component> fetch_once(const Component& image, Id image_type, const std::vector<Component>& coordinates,
+                                      const Component& level, std::uint32_t flags);
     /// False: nothing was emitted.
     bool store_directly(const Component& image, Id image_type, const std::vector<Component>& coordinates,
                         const std::vector<Component>& texel, const std::function<void()>& otherwise);

@@ -19,7 +19,7 @@ using spv::Op;
 
 /// Instructions up to which a module may grow as all calls are replaced by what they call. Beyond, functions that are called
 /// more than once become functions of the code that is made, the large ones first.
-constexpr std::uint64_t most_inlined_instructions = 30'000;
+constexpr std::uint64_t most_inlined_instructions = 60'000;
 /// Functions that are kept are at least so large; a call costs about as much as a smaller one.
 constexpr std::uint64_t kept_sizes[] = {4'000, 1'000, 250, 60};
 /// Blocks up to which SPIRV-Tools makes values of variables: it takes time by the square of their number. LLVM does it for others.

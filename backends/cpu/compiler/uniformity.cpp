@@ -207,10 +207,14 @@ void Uniformity::visit(const Instruction& at, Id block) {
                     mark(content_, root);
             return;
         }
+        case Op::OpImageFetch:
+            // What textures hold does not change while a shader runs; the third operand is a mask of those behind it.
+            if (is_divergent(at.operand(0)) || is_divergent(at.operand(1)) || any_operand(3)) mark(divergent_, at.result);
+            return;
         case Op::OpImageSampleImplicitLod: case Op::OpImageSampleExplicitLod: case Op::OpImageSampleDrefImplicitLod:
         case Op::OpImageSampleDrefExplicitLod: case Op::OpImageSampleProjImplicitLod:
         case Op::OpImageSampleProjExplicitLod: case Op::OpImageSampleProjDrefImplicitLod:
-        case Op::OpImageSampleProjDrefExplicitLod: case Op::OpImageFetch: case Op::OpImageGather:
+        case Op::OpImageSampleProjDrefExplicitLod: case Op::OpImageGather:
         case Op::OpImageDrefGather: case Op::OpImageRead: case Op::OpImageQueryLod: case Op::OpImageSparseRead:
         case Op::OpAtomicLoad: case Op::OpAtomicExchange: case Op::OpAtomicCompareExchange: case Op::OpAtomicIIncrement:
         case Op::OpAtomicIDecrement: case Op::OpAtomicIAdd: case Op::OpAtomicISub: case Op::OpAtomicSMin:

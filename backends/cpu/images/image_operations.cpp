@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "backends/cpu/images/image_operations.h"
 
+#include <bit>
+#include <cstring>
+
 #include "backends/cpu/images/image_kernels.h"
 
 namespace nacre::cpu {
@@ -34,6 +37,36 @@ NacreCpuImageFunction image_function(std::uint32_t lanes, InstructionSet set) {
 #endif
     return baseline::image_function(lanes);
 }
+
+namespace {
+
+TexelWords fetch_texel(const ImageView* image, std::uint32_t first, std::uint32_t second, std::uint32_t third,
+                       std::uint32_t level, std::uint32_t flags) {
+    const bool is_integer = (flags & image_integer) != 0;
+    const auto joined = [](std::uint32_t low, std::uint32_t high) { return low | std::uint64_t{high} << 32; };
+    const DirectTexels words = is_integer ? DirectTexels::integer_word : DirectTexels::float_word;
+    if (image->direct_texels == words && image->dimension == rhi::ViewDimension::d2 && level < image->mip_count) {
+        const ImageLevel& from = image->levels[level];
+        if (first >= from.width || second >= from.height) return {};
+        std::uint32_t word = 0;
+        std::memcpy(&word, from.data + std::size_t{second} * from.row_stride + std::size_t{first} * 4, sizeof(word));
+        return {word, joined(0, is_integer ? 1 : std::bit_cast<std::uint32_t>(1.0f))};
+    }
+    static const NacreCpuImageFunction run = image_function(4);
+    ImageArguments arguments;
+    for (std::uint32_t lane = 0; lane < 4; ++lane) {
+        arguments.coordinates[0][lane] = first, arguments.coordinates[1][lane] = second;
+        arguments.coordinates[2][lane] = third, arguments.lod[lane] = std::bit_cast<float>(level);
+        arguments.sample[lane] = 0;
+    }
+    run(image, nullptr, &arguments, flags, 1);
+    const auto& result = arguments.result;
+    return {joined(result[0][0], result[1][0]), joined(result[2][0], result[3][0])};
+}
+
+}  // namespace
+
+NacreCpuTexelFunction texel_function() { return fetch_texel; }
 
 NacreCpuImageFunction image_function(std::uint32_t lanes) { return image_function(lanes, best_instruction_set()); }
 

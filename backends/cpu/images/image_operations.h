@@ -33,6 +33,9 @@ NacreCpuImageFunction image_function(std::uint32_t lanes);
 /// The same for one instruction set; null where the machine lacks it.
 NacreCpuImageFunction image_function(std::uint32_t lanes, InstructionSet set);
 
+/// For one texel. Thread-safe.
+NacreCpuTexelFunction texel_function();
+
 constexpr std::uint32_t flags_of(ImageOperation operation) { return static_cast<std::uint32_t>(operation); }
 
 }  // namespace nacre::cpu

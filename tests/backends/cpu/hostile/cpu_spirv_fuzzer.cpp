@@ -112,7 +112,9 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
     Words words = words_of(data, size);
     const bool is_blind = random.chance(50);
     for (int i = random.between(1, 5); i > 0; --i) {
-        auto module = !is_blind && random.chance(95) ? MutableModule::parse(words) : std::nullopt;
+        // What knows SPIR-V asks for valid modules.
+        const bool may_know = !is_blind && random.chance(95) && rhi::spirv::validate(words, "input");
+        auto module = may_know ? MutableModule::parse(words) : std::nullopt;
         if (!module) hostile::mutate_words(words, random);
         else if (module->mutate(random)) words = module->words();
     }
