@@ -162,7 +162,7 @@ class TextWriter {
             texel = fmt::format("closure_texel_moved({}, {}, tree_row({}u), tree_row({}u))", index, reference.uv_set, row,
                                 row + 1);
         }
-        samples_.push_back({index, reference.uv_set, std::move(texel), without});
+        samples_.push_back({index, static_cast<std::uint32_t>(reference.uv_set), std::move(texel), without});
         return fmt::format("closure_sample_{}()", samples_.size() - 1);
     }
 
