@@ -19,7 +19,7 @@ namespace {
 
 using materials::closures::Library;
 
-RENDERER_SUITE(Closures);
+RENDERER_SUITE_OF(Closures, compiler_variants());
 
 constexpr std::uint32_t side = 64;
 

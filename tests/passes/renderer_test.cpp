@@ -61,6 +61,15 @@ MadeDevice* device_for(const RenderVariant& variant) {
 
 }  // namespace
 
+std::vector<RenderVariant> compiler_variants() {
+    std::vector<RenderVariant> variants = render_variants();
+    const bool has_gles = std::ranges::find(variants, "gles", &RenderVariant::name) != variants.end();
+    std::erase_if(variants, [&](const RenderVariant& variant) {
+        return variant.name == "vulkan_renderpass" || (variant.name == "gl" && has_gles);
+    });
+    return variants;
+}
+
 const std::vector<RenderVariant>& render_variants() {
     static const std::vector<RenderVariant> available = [] {
         const RenderVariant all[] = {{"vulkan", "vulkan", "none", "high"},

@@ -35,6 +35,8 @@ inline void PrintTo(const RenderVariant& variant, std::ostream* out) { *out << v
 
 /// Those of which a device can be made here.
 const std::vector<RenderVariant>& render_variants();
+/// One of them for each compiler that shaders meet, for tests whose shaders take long to compile.
+std::vector<RenderVariant> compiler_variants();
 
 /// A frame, and the renderer that can still be asked.
 struct Shot {
@@ -101,10 +103,11 @@ void place(scene::Scene& scene, scene::Primitive primitive, std::uint32_t materi
            const glm::mat4& transform = glm::mat4(1.0f));
 scene::Light directional_light(const glm::vec3& direction, float lux);
 
-#define RENDERER_SUITE(Suite)                                                                        \
-    class Suite : public ::nacre::test::RendererTest {};                                             \
-    GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Suite);                                            \
-    INSTANTIATE_TEST_SUITE_P(Passes, Suite, ::testing::ValuesIn(::nacre::test::render_variants()),   \
+#define RENDERER_SUITE_OF(Suite, variants)                           \
+    class Suite : public ::nacre::test::RendererTest {};             \
+    GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(Suite);            \
+    INSTANTIATE_TEST_SUITE_P(Passes, Suite, ::testing::ValuesIn(variants), \
                              [](const auto& parameter) { return parameter.param.name; })
+#define RENDERER_SUITE(Suite) RENDERER_SUITE_OF(Suite, ::nacre::test::render_variants())
 
 }  // namespace nacre::test
