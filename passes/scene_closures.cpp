@@ -382,13 +382,16 @@ ShadingFeatures SceneClosures::features_of(const ClosureMaterial& material, cons
 
 std::vector<EmbeddedFile> SceneClosures::files() const {
     std::vector<EmbeddedFile> result;
+    static const std::string points =
+        fmt::format("#version 460\n#define MATERIAL_BLOCK_BINDING {}\n#include \"passes/hit_shading/surface_points.glsl\"\n",
+                    sideband_binding);
     for (const std::unique_ptr<Text>& text : texts_) {
         result.push_back({text->topology_path, text->topology});
         result.push_back({text->base_pass_path, text->base_pass});
         result.push_back({text->blend_path, text->blend});
         result.push_back({text->emission_path, text->emission});
         // The same for all: it writes down places.
-        result.push_back({text->points_path, "#version 460\n#include \"passes/hit_shading/surface_points.glsl\"\n"});
+        result.push_back({text->points_path, points});
     }
     return result;
 }

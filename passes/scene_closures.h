@@ -41,7 +41,8 @@ struct ClosureMaterial {
     [[nodiscard]] bool writes_slices() const { return layout.material_words() > 2 || layout.has_subsurface; }
 };
 
-/// Bindings of set 1: the blob, four tables for closures, the sideband (of trees: their numbers), then textures.
+/// Bindings of set 1: the blob, four tables for closures, the sideband, then textures; of trees first their numbers, and the blob
+/// where the sideband of others is.
 inline constexpr std::uint32_t closure_table_count = 4;  ///< Interface, medium, anisotropy, specular tints.
 /// Whether closures with these features read a table.
 [[nodiscard]] constexpr bool reads_table(std::uint32_t features, std::uint32_t table) {

@@ -173,13 +173,19 @@ Expected<void> SceneMaterials::add_closures(const scene::Scene& scene, std::uint
 
 Expected<void> SceneMaterials::bind_closures(std::uint32_t material, const ClosureMaterial& closures) {
     Closures& result = closures_[material];
-    // Draws of trees read nothing of the blob: their text knows what is in its header.
+    // The numbers come first: lavapipe of Mesa 22.3 dies where conditions read the second uniform buffer of a set, and
+    // draws of trees read nothing of the blob but its number.
     std::vector<rhi::BindingLayout> bindings = {
+        {.binding = 0, .type = rhi::BindingType::uniform_buffer, .stages = rhi::ShaderStage::fragment},
         {.binding = sideband_binding, .type = rhi::BindingType::uniform_buffer, .stages = rhi::ShaderStage::fragment}};
-    std::vector<rhi::BindGroupEntry> entries = {{.binding = sideband_binding,
+    std::vector<rhi::BindGroupEntry> entries = {{.binding = 0,
                                                  .buffer = block_,
                                                  .offset = result.first_row * sizeof(glm::uvec4),
-                                                 .size = result.row_count * sizeof(glm::uvec4)}};
+                                                 .size = result.row_count * sizeof(glm::uvec4)},
+                                                {.binding = sideband_binding,
+                                                 .buffer = block_,
+                                                 .offset = std::uint64_t{material} * blob_stride_ * sizeof(glm::uvec4),
+                                                 .size = sizeof(materials::MaterialBlob)}};
     const auto add = [&](std::uint32_t binding, rhi::Texture texture, rhi::Sampler sampler) {
         bindings.push_back({.binding = binding,
                             .type = rhi::BindingType::combined_texture_sampler,

@@ -7,7 +7,10 @@ layout(early_fragment_tests) in;
 #include "passes/hit_shading/surface_point.glsl"
 
 layout(set = 0, binding = 1, std430) writeonly buffer SurfacePoints { SurfacePoint points[]; };
-layout(set = 1, binding = 0, std140) uniform MaterialBlock { uvec4 rows[8]; } material_block;
+#ifndef MATERIAL_BLOCK_BINDING
+#define MATERIAL_BLOCK_BINDING 0
+#endif
+layout(set = 1, binding = MATERIAL_BLOCK_BINDING, std140) uniform MaterialBlock { uvec4 rows[8]; } material_block;
 
 void main() {
     SurfacePoint point;

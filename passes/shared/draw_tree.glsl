@@ -5,7 +5,7 @@
 #define NACRE_DRAW_TREE
 #include "passes/shared/fragment_inputs.glsl"
 
-layout(set = 1, binding = 5, std140) uniform TreeNumbers { vec4 rows[TREE_NUMBERS]; } tree_numbers;
+layout(set = 1, binding = 0, std140) uniform TreeNumbers { vec4 rows[TREE_NUMBERS]; } tree_numbers;
 #define tree_row(row) tree_numbers.rows[row]
 // Which texture coordinates a draw has is known when its shader is made.
 #define WHERE_UV0

@@ -199,6 +199,30 @@ TEST_P(Closures, WhatLiesBehindShowsThroughAsMuchAsTheTreeSays) {
 
 // A coat that covers nearly nothing leaves the picture of the plain slab: both are shaded by the same closures. Compared
 // are means over rings of a ball, since stored closures are dithered.
+// What white textures multiply is what it was. Two textures of a blended tree once broke a driver.
+TEST_P(Closures, WhiteTexturesLeaveWhatShowsThrough) {
+    const auto seen = [&](bool is_textured) {
+        scene::Scene scene = empty_scene();
+        scene::Image white{.name = "white", .color_space = scene::ColorSpace::linear, .width = 1, .height = 1};
+        white.pixels = std::make_shared<std::vector<std::uint8_t>>(std::vector<std::uint8_t>(4, 255));
+        scene.images.push_back(white);
+        materials::MaterialDescription glass{.name = "glass"};
+        glass.metallic = 0.2f;
+        glass.roughness = 0.3f;
+        glass.base_color = {0.5f, 0.25f, 1.0f, 1.0f};
+        glass.transmission = materials::Transmission{.factor = 0.8f};
+        glass.double_sided = true;
+        if (is_textured) glass.transmission->texture = glass.metallic_roughness_texture = {.image = 0};
+        materials::MaterialDescription glow{.name = "glow"};
+        glow.unlit = true;
+        place(scene, scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), add_material(scene, glow));
+        place(scene, scene::parallelogram({-1, -1, 1}, {2, 0, 0}, {0, 2, 0}), add_material(scene, glass));
+        return render(scene, {.width = 16, .height = 16, .exposure_ev = 0.0f}).radiance_at(8, 8);
+    };
+    const glm::vec3 plain = seen(false), textured = seen(true);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(textured[i], plain[i], 1e-3f + 2e-3f * plain[i]);
+}
+
 TEST_P(Closures, EmptyCoatsLeaveWhatTheyCover) {
     constexpr int rings = 4;
     const auto ring_means = [&](const materials::MaterialDescription& material) {
