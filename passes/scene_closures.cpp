@@ -465,10 +465,11 @@ std::string SceneClosures::hit_text() const {
             t);
     }
     text +=
-        "}\nvoid tree_hit_properties(uint topology, vec3 to_viewer, float footprint, out vec3 albedo, out float roughness) {\n"
-        "    albedo = vec3(0.0);\n    roughness = 1.0;\n";
+        "}\nvoid tree_hit_properties(uint topology, vec3 to_viewer, float footprint, out vec3 albedo, out vec3 "
+        "emission, out float roughness) {\n    albedo = emission = vec3(0.0);\n    roughness = 1.0;\n";
     for (std::size_t t = 0; t < texts_.size(); ++t) {
-        text += fmt::format("    if (topology == {0}u) closure_properties_t{0}(to_viewer, footprint, albedo, roughness);\n", t);
+        text += fmt::format(
+            "    if (topology == {0}u) closure_properties_t{0}(to_viewer, footprint, albedo, emission, roughness);\n", t);
     }
     return text + "}\n";
 }

@@ -4,7 +4,7 @@
 // What can be asked of a surface whose material is a tree without lighting it. Behind the text of a topology.
 #include "passes/shared/closure_inputs.glsl"
 
-void closure_properties(vec3 to_viewer, float footprint, out vec3 albedo, out float roughness) {
+void closure_properties(vec3 to_viewer, float footprint, out vec3 albedo, out vec3 emission, out float roughness) {
     SurfaceFrames frames = surface_frames();
     TreeState state = shade_surface(frames, to_viewer, footprint);
     albedo = vec3(0.0);
@@ -18,6 +18,7 @@ void closure_properties(vec3 to_viewer, float footprint, out vec3 albedo, out fl
         albedo += weight * (own.specular * top_transmittance(path, view.z) +
                             (own.fuzz + own.diffuse) * top_transmittance(path, mean_cosine));
     }
+    emission = tree_emission(state);
     roughness = state.slabs[0].roughness;
 }
 

@@ -12,6 +12,7 @@
 #include "passes/shared/slab_words.glsl"
 // Made for a scene (passes/hit_materials.h): the closures' library with the features that it has, its topologies and kinds.
 #include "passes/shared/hit_kinds.glsl"
+#include "passes/shared/slab_closure.glsl"
 
 struct HitWords {
     uint words[hit_word_capacity];
@@ -64,24 +65,21 @@ HitWords hit_words(vec3 to_viewer, float footprint, uvec2 pixel) {
 
 HitProperties hit_properties(vec3 to_viewer, float footprint) {
     HitProperties properties;
-    properties.emission = hit_emission();
     if (hit_is_tree()) {
-        tree_hit_properties(material_type() - blob_tree_type, to_viewer, footprint, properties.albedo, properties.roughness);
+        tree_hit_properties(material_type() - blob_tree_type, to_viewer, footprint, properties.albedo, properties.emission,
+                            properties.roughness);
         return properties;
     }
+    properties.emission = hit_emission();
     vec3 color = clamp(hit_base_color().rgb, 0.0, 1.0);
     properties.albedo = color;
     properties.roughness = 1.0;
     if (hit_is_unlit()) return properties;
     SingleSlab slab = hit_slab(color);
     properties.roughness = slab.roughness;
-    float cosine = clamp(dot(slab.normal, to_viewer), 0.01, 1.0);
-    GgxAlbedo lobe = ggx_albedo(cosine, max(slab.roughness * slab.roughness, 1e-4));
-    // Single scattering and what Turquin's compensation adds; the rest is the base's.
-    vec3 single = slab.f0 * (1.0 - lobe.schlick) + vec3(slab.f90 * lobe.schlick);
-    vec3 mean = slab.f0 + (vec3(slab.f90) - slab.f0) / 21.0;
-    vec3 specular = min(single * (1.0 - lobe.missing) * (vec3(1.0) + mean * (lobe.missing / (1.0 - lobe.missing))), vec3(1.0));
-    properties.albedo = specular + slab.diffuse * (vec3(1.0) - specular);
+    vec3 view = view_in_frame(frame_of_normal(slab.normal), to_viewer);
+    ClosureAlbedo albedo = closure_albedo(prepare_closure_under(slab_of(slab), interface_of(slab), view, footprint));
+    properties.albedo = albedo.specular + albedo.diffuse;
     return properties;
 }
 

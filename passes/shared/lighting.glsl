@@ -9,7 +9,6 @@
 // LIGHTS: number of entries in the light list; undefined: no lights. SHADOW_VIEWS: number of shadow views; undefined: no
 // shadows. SHADOW_LAYERS: there are several, and the map has layers. SHADOW_FILTER_WIDTH: 1, 3 or 5.
 #include "passes/shared/camera.glsl"
-#include "passes/shared/single_slab.glsl"
 #include "passes/shared/spherical_harmonics.glsl"
 #ifndef NACRE_CLOSURES_TABLE_TEXTURES
 layout(set = 0, binding = 3) uniform usampler2D interface_texels;
@@ -17,6 +16,7 @@ layout(set = 0, binding = 3) uniform usampler2D interface_texels;
 #endif
 #include "materials/closures/closure.glsl"
 #include "materials/closures/stored_frame.glsl"
+#include "passes/shared/slab_closure.glsl"
 
 #ifdef LIGHTS
 struct Light {
@@ -176,19 +176,10 @@ ClosureValue environment_value(Slab slab, Closure closure, StoredFrame frame, Li
     return value;
 }
 
-// A plain slab is a closure without any feature; its interface's grazing reflectance is bounded, as KHR_materials_specular
-// wants it.
 vec3 shade_slab(SingleSlab plain, vec3 position, vec3 to_viewer) {
-    Slab slab;
-    slab.features = 0u;
-    slab.coverage = 1.0;
-    slab.f0 = plain.f0;
-    slab.roughness = plain.roughness;
-    slab.albedo = plain.diffuse;
-    Fresnel bare = make_plain_fresnel(slab.f0);
-    bare.grazing = min(bare.grazing, vec3(plain.f90));
+    Slab slab = slab_of(plain);
     StoredFrame frame = frame_of_normal(plain.normal);
-    Closure closure = prepare_lit_closure(slab, bare, view_in_frame(frame, to_viewer), 0.0);
+    Closure closure = prepare_lit_closure(slab, interface_of(plain), view_in_frame(frame, to_viewer), 0.0);
     LitPoint point;
     point.position = position;
     point.to_viewer = to_viewer;

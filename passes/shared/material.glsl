@@ -10,6 +10,7 @@
 #endif
 #include "passes/shared/draw_material.glsl"
 #endif
+#include "materials/closures/conversions.glsl"
 #include "passes/shared/single_slab.glsl"
 
 #if defined(HAS_NORMALS) || defined(MATERIAL_KIND)
@@ -83,12 +84,9 @@ SingleSlab evaluate_slab(vec3 color) {
 #ifdef SPECULAR_COLOR_TEXTURE
     f0 *= specular_color_texel().rgb;
 #endif
-    // A dielectric beside a metal: the albedo of the one slab that scatters as much as the two, of whose light less gets
-    // below the common interface. The dielectric's albedo by its share alone would leave a dark halo between them.
-    vec3 scattering = (1.0 - metallic) * (vec3(1.0) - f0);
-    vec3 entering = scattering + metallic * (vec3(1.0) - color);
-    slab.diffuse = min(color * scattering / max(entering, vec3(1e-6)), vec3(1.0));
-    slab.f0 = mix(f0, color, metallic);
+    AlbedoAndF0 both = metalness_to_albedo_f0(color, metallic, f0);
+    slab.diffuse = both.albedo;
+    slab.f0 = both.f0;
     slab.f90 = mix(f90, 1.0, metallic);
     slab.normal = shading_normal();
     slab.occlusion = 1.0;

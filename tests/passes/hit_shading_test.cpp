@@ -512,14 +512,22 @@ TEST_P(HitShading, PropertiesCanBeAskedFor) {
     if (GetParam().profile == "mobile") return;
     // A tree against the host's double precision.
     scene::Scene coated = empty_scene();
-    const auto tree = *materials::make_builtin_material("single-haze-f90");
-    place(coated, scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), add_material(coated, built_in("single-haze-f90")));
+    auto tree = *materials::make_builtin_material("single-haze-f90");
+    for (materials::Node& node : tree.nodes) {
+        node.slab.features |= materials::slab_emission;
+        node.slab.emission = glm::vec3(3.0f, 2.0f, 1.0f);
+    }
+    materials::MaterialDescription glowing_tree{.name = "tree"};
+    glowing_tree.tree = std::make_shared<const materials::Tree>(tree);
+    place(coated, scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), add_material(coated, glowing_tree));
     const Shot shot = render(coated, options);
     const auto flat = materials::flatten(tree);
     ASSERT_TRUE(flat);
     const glm::dvec3 expected = materials::directional_albedo(materials::shade(*flat, {0.0, 0.0, 1.0}, 2.0 / side));
     const glm::vec4 seen = Comparison(shot).hits<glm::vec4>("albedo")[32 * side + 32];
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen[c], expected[c], 2e-3) << c;
+    const glm::vec3 sent = glm::vec3(Comparison(shot).hits<glm::vec4>("emission")[32 * side + 32]);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(sent[c], static_cast<float>(3 - c), 2e-3f) << c;
 }
 
 // Ray cones and levels that are given, against the level of the closed form: texels that a cone covers, as a power of two.
