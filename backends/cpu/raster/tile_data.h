@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "backends/cpu/checks/check_interface.h"
 #include "backends/cpu/raster/srgb_tables.h"
 #include "backends/cpu/shader_interface.h"
 #include "rhi/pipeline.h"
@@ -154,6 +155,7 @@ struct ColorPlan {
     std::uint32_t output;  ///< Into FragmentBatch::colors.
     std::uint32_t components;
     bool blends, partial;  ///< `partial`: the write mask leaves channels of the format out.
+    bool reads_destination;  ///< Blends, and what comes of it depends on what the target holds.
     bool as_it_is;         ///< Texels are the words of the output, without any conversion.
     std::uint8_t write_mask;  ///< One bit for each channel.
     rhi::BlendState blend;
@@ -180,6 +182,7 @@ struct DrawPlan {
     ColorPlan colors[8];
     bool dual_source;
     float blend_constants[4];
+    BlendCheck check_blend;  ///< Told of what blending reads; null: nobody asks.
     std::int32_t x_begin, x_end, y_begin, y_end;  ///< Pixels that may be drawn.
     // Clip coordinates to window coordinates: for planes from clip coordinates.
     double scale[3], translation[3];

@@ -673,10 +673,34 @@ struct TileRun {
         return passed;
     }
 
+    /// Shows what the target holds of lanes, before it is blended with, to those who look for faults.
+    void check_destinations(const ColorPlan& plan, const FragmentBatch& batch, const std::uint32_t* places,
+                            std::uint32_t quads, std::uint32_t sample, std::uint32_t mask) const {
+        const ColorTarget& target = targets.colors[plan.target];
+        std::uint32_t old[4][max_lanes] = {};
+        for (std::uint32_t lane = 0; lane < 4 * quads; ++lane) {
+            if ((mask >> lane & 1) == 0) continue;
+            const std::uint32_t* const words = colors_at(places[lane / 4] + (lane & 3)) + color_offset(target, sample);
+            for (std::uint32_t word = 0; word < target.words; ++word) old[word][lane] = words[16 * word];
+            // Texels with doubles are never brought into the tile.
+            if (draw->in_double && target.shadow)
+                for (std::uint32_t word = 0; word < target.words; ++word)
+                    std::memcpy(&old[word][lane],
+                                texels_of(target, sample, batch.x[lane / 4] + static_cast<std::int32_t>(lane & 1) - tile_x,
+                                          batch.y[lane / 4] + static_cast<std::int32_t>(lane >> 1 & 1) - tile_y) +
+                                    4 * word,
+                                target.texel_bytes < 4 ? target.texel_bytes : 4);
+        }
+        draw->check_blend(draw->context->checks, {plan.target, sample, batch.x, batch.y, old, mask});
+    }
+
     void write_color(const ColorPlan& plan, const FragmentBatch& batch, const std::uint32_t* places,
                      std::uint32_t quads, const std::uint32_t (&masks)[most_samples], std::uint32_t first,
                      std::uint32_t end, bool conflict) {
         const ColorTarget& target = targets.colors[plan.target];
+        if (plan.reads_destination && draw->check_blend)
+            for (std::uint32_t sample = first; sample < end; ++sample)
+                if (masks[sample] != 0) check_destinations(plan, batch, places, quads, sample, masks[sample]);
         if (draw->in_double && target.shadow) {
             for (std::uint32_t sample = first; sample < end; ++sample)
                 if (masks[sample] != 0) write_double_colors(*draw, plan, target, batch, sample, masks[sample]);
