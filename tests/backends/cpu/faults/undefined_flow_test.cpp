@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <ostream>
 #include <span>
 #include <string>
 #include <vector>
@@ -51,6 +52,8 @@ struct Varying {
     const char* object;  ///< Empty: there is no fault.
     const char* place = "pixel (0, 0)";
 };
+
+void PrintTo(const Varying& varying, std::ostream* out) { *out << varying.name; }
 
 const Varying varyings[] = {
     {"Never", "layout(location = 0) out vec4 tint;\n", "",
@@ -140,7 +143,7 @@ void main() {
      R"(layout(location = 0) in vec2 place;
 layout(location = 0) out vec4 color;
 void main() {
-    color = vec4(interpolateAtCentroid(place.x), interpolateAtOffset(place, vec2(0.25))); // FAULT
+    color = vec4(interpolateAtCentroid(place.x), interpolateAtOffset(place, vec2(0.25)), 1.0); // FAULT
 })",
      "place"},
     {"NotUsed", "layout(location = 0) out vec4 tint;\n", "",
@@ -371,6 +374,8 @@ struct UndefinedIndex {
     const char* name;
     const char* text;
 };
+
+void PrintTo(const UndefinedIndex& index, std::ostream* out) { *out << index.name; }
 
 const UndefinedIndex undefined_indices[] = {
     {"OfAVector", R"(layout(local_size_x = 8) in;
