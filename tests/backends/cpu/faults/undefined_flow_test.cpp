@@ -386,7 +386,8 @@ void main() {
     uint chosen;
     if (numbers.words[i] != 2u) chosen = 1u;
     vec4 steps = vec4(float(i), 1.0, 2.0, 3.0);
-    if (steps[chosen] > 7.0) result.words[0] = 1.0; // FAULT
+    float step = (steps * 2.0)[chosen]; // FAULT
+    if (step > 7.0) result.words[0] = 1.0;
 })"},
     {"OfAnArrayOfBuffers", R"(layout(local_size_x = 8) in;
 layout(set = 0, binding = 0) buffer Output { uint words[256]; } result[1];
@@ -429,9 +430,8 @@ layout(set = 0, binding = 1) readonly buffer Input { uint words[64]; } numbers;
 void main() {
     uint i = gl_GlobalInvocationID.x;
     vec4 steps;
-    steps[numbers.words[i] & 1u] = 3.0;
-    steps[(numbers.words[i] & 1u) ^ 1u] = 4.0;
-    result.words[i] = steps[(numbers.words[i] >> 1) & 1u];
+    steps.xy = vec2(3.0, float(i));
+    result.words[i] = (steps * 2.0)[numbers.words[i] & 1u];
 })"));
     expect_none(bench);
 }
