@@ -162,7 +162,8 @@ void Executor::check_draw(const DrawCall& call, const CommandChecks& checks) {
         if (attachment.loads_nothing && state.depth_test && asks(state.depth_compare))
             add_undefined("test depth", fmt::format("in {}", place()), "depths that were written",
                           fmt::format("some of {}", attachment.checked->name()));
-        if (attachment.loads_no_stencil && state.stencil_test && (asks(state.front.compare) || asks(state.back.compare)))
+        const bool asks_stencil = state.stencil_test && (asks(state.front.compare) || asks(state.back.compare));
+        if (attachment.loads_no_stencil && asks_stencil)
             add_undefined("test stencil", fmt::format("in {}", place()), "values that were written",
                           fmt::format("some of {}", attachment.checked->name()));
     }

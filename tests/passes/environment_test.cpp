@@ -29,8 +29,8 @@ double half(std::uint16_t bits) {
     return exponent == 0 ? std::ldexp(fraction, -24) : std::ldexp(1024.0 + fraction, exponent - 25);
 }
 
-// A picture that rises from row to row away from one of them: each texel of the cube tells the row that its direction looks
-// at, to a few thousandths. Near the poles too, where the cosine has lost the angle.
+// A picture that rises from row to row away from one of them: each texel of the cube tells the row that its direction
+// looks at, to a few thousandths. Near the poles too, where the cosine has lost the angle.
 TEST_P(Environment, LooksAtTheRowOfItsDirection) {
     // As many rows as the cube has room for.
     const std::uint32_t height = 2 * (*passes::find_profile(GetParam().profile))->environment_size;
@@ -47,7 +47,8 @@ TEST_P(Environment, LooksAtTheRowOfItsDirection) {
         double largest = 0.0;
         for (int face = 0; face < 6; ++face) {
             const auto texels = shot.intermediate<std::uint16_t>("environment", static_cast<std::uint32_t>(face));
-            const auto side = static_cast<std::uint32_t>(std::lround(std::sqrt(static_cast<double>(texels.size()) / 4.0)));
+            const double texel_count = static_cast<double>(texels.size()) / 4.0;
+            const auto side = static_cast<std::uint32_t>(std::lround(std::sqrt(texel_count)));
             ASSERT_EQ(std::size_t{side} * side * 4, texels.size());
             for (std::uint32_t y = 0; y < side; ++y)
                 for (std::uint32_t x = 0; x < side; ++x) {

@@ -346,7 +346,8 @@ void check_blend(const CommandChecks* checks, const BlendedTexels& texels) {
         for (std::uint32_t word = 0; word < target.texel_bytes / 4; ++word)
             is_poison = is_poison && texels.words[word][lane] == poison_word(*offset / 4 + word);
         if (!is_poison) continue;
-        checks->log->add(ShaderFault::uninitialized_read, nullptr, checks->command + target.memory->name(), 1, false, [&] {
+        const std::string object = checks->command + target.memory->name();
+        checks->log->add(ShaderFault::uninitialized_read, nullptr, object, 1, false, [&] {
             FoundFault fault;
             fault.attempted = "blend";
             fault.subject = fmt::format("with {}, {}, pixel ({}, {})", target.memory->name(), checks->command, x, y);

@@ -40,7 +40,8 @@ NacreCpuCheckFault check_fault_function();
 NacreCpuCheckMemory check_memory_function();
 NacreCpuCheckImage check_image_function();
 NacreCpuCheckInput check_input_function();
-/// Reports texels that nothing has written, of formats of 32 bits and more: what is written to others may look like them.
+/// Reports texels that nothing has written, of formats of 32 bits and more: what is written to others may look like
+/// them.
 void check_blend(const CommandChecks* checks, const BlendedTexels& texels);
 
 /// Fills memory with what does harm: signalling NaNs as floats, far out of range as integers, different in each word.

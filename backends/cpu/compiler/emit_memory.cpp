@@ -511,7 +511,8 @@ Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t ind
         if (!std::ranges::any_of(variable.components, &Component::undefined)) return loaded;
         LaneVariable told;
         told.type = variable.type;
-        told.memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * 4 * lanes), "undefined");
+        told.memory =
+            make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * 4 * lanes), "undefined");
         std::vector<Component> flags;
         for (const Component& component : variable.components)
             flags.emplace_back(component.undefined ? component.undefined : builder.getFalse());

@@ -311,8 +311,8 @@ Component FragmentEmitter::difference(const Component& value, bool vertical, boo
         low[i] = static_cast<int>(first);
         high[i] = static_cast<int>(first + (vertical ? 2 : 1));
     }
-    Component made =
-        builder.CreateFSub(builder.CreateShuffleVector(value.value, high), builder.CreateShuffleVector(value.value, low));
+    Component made = builder.CreateFSub(builder.CreateShuffleVector(value.value, high),
+                                        builder.CreateShuffleVector(value.value, low));
     if (value.undefined && value.undefined->getType()->isVectorTy())
         made.undefined = builder.CreateOr(builder.CreateShuffleVector(value.undefined, high),
                                           builder.CreateShuffleVector(value.undefined, low));

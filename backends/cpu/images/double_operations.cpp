@@ -388,7 +388,8 @@ class Lane {
             for (double x = std::floor(u - half_width); x <= std::ceil(u + half_width); x += 1.0) {
                 const double dx = x - u, dy = y - v, q = (a * dx * dx + b * dx * dy + c * dy * dy) * to_index;
                 if (!(q < elliptical_weight_count)) continue;
-                const double weight = static_cast<double>(elliptical_weights()[static_cast<std::size_t>(std::max(q, 0.0))]);
+                const double weight =
+                    static_cast<double>(elliptical_weights()[static_cast<std::size_t>(std::max(q, 0.0))]);
                 bool is_border = false;
                 const std::int64_t at_x = wrapped(static_cast<std::int64_t>(x) + (has_offset_ ? offset_[0] : 0),
                                                   level.width, sampler_->address_u, is_border);

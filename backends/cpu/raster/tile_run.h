@@ -683,13 +683,12 @@ struct TileRun {
             const std::uint32_t* const words = colors_at(places[lane / 4] + (lane & 3)) + color_offset(target, sample);
             for (std::uint32_t word = 0; word < target.words; ++word) old[word][lane] = words[16 * word];
             // Texels with doubles are never brought into the tile.
-            if (draw->in_double && target.shadow)
-                for (std::uint32_t word = 0; word < target.words; ++word)
-                    std::memcpy(&old[word][lane],
-                                texels_of(target, sample, batch.x[lane / 4] + static_cast<std::int32_t>(lane & 1) - tile_x,
-                                          batch.y[lane / 4] + static_cast<std::int32_t>(lane >> 1 & 1) - tile_y) +
-                                    4 * word,
-                                target.texel_bytes < 4 ? target.texel_bytes : 4);
+            if (!draw->in_double || !target.shadow) continue;
+            const std::int32_t x = batch.x[lane / 4] + static_cast<std::int32_t>(lane & 1) - tile_x;
+            const std::int32_t y = batch.y[lane / 4] + static_cast<std::int32_t>(lane >> 1 & 1) - tile_y;
+            for (std::uint32_t word = 0; word < target.words; ++word)
+                std::memcpy(&old[word][lane], texels_of(target, sample, x, y) + 4 * word,
+                            target.texel_bytes < 4 ? target.texel_bytes : 4);
         }
         draw->check_blend(draw->context->checks, {plan.target, sample, batch.x, batch.y, old, mask});
     }

@@ -226,7 +226,8 @@ int main(int argc, char** argv) {
     for (int i = 1; i < argc; ++i) {
         const std::string text = argv[i];
         const auto value = [&](const char* name) { return nacre::test::value_of(text, name); };
-        if (nacre::test::read_number(text, "seed", settings.seed) || nacre::test::read_number(text, "count", settings.count)) continue;
+        if (nacre::test::read_number(text, "seed", settings.seed)) continue;
+        if (nacre::test::read_number(text, "count", settings.count)) continue;
         if (const auto workers = value("workers")) settings.workers = std::max(1, std::atoi(workers->c_str()));
         else if (const auto folder = value("folder")) settings.folder = *folder;
         else if (const auto devices = value("on")) {

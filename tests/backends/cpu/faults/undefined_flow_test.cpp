@@ -77,7 +77,8 @@ layout(location = 0) out vec4 color;
 void main() { color = vec4(tint.xyz, 1.0); })",
      ""},
     // One vertex is enough: it has a share in all pixels.
-    {"OneVertex", "layout(location = 0) out vec4 tint;\n", "    if (gl_VertexIndex != 2) tint = vec4(corner, 1.0, 1.0);\n",
+    {"OneVertex", "layout(location = 0) out vec4 tint;\n",
+     "    if (gl_VertexIndex != 2) tint = vec4(corner, 1.0, 1.0);\n",
      R"(layout(location = 0) in vec4 tint;
 layout(location = 0) out vec4 color;
 void main() {
@@ -224,7 +225,8 @@ TEST(CpuFaults, BlendingWithUndefinedTexelsIsReported) {
         SCOPED_TRACE(kind);
         FaultBench bench(std::string("cpu:") + kind);
         draw_in_pass(bench, {make(bench, "white.frag", white, added())}, LoadOperation::discard);
-        expect_one(bench, {"texture 'target'", "draw 1 of list 'once', pass 'only'", "pixel (0, 0)", "(and 63 more here)"});
+        expect_one(bench,
+                   {"texture 'target'", "draw 1 of list 'once', pass 'only'", "pixel (0, 0)", "(and 63 more here)"});
     }
 }
 

@@ -262,7 +262,8 @@ int main(int argc, char** argv) {
     for (int i = 1; i < argc; ++i) {
         const std::string text = argv[i];
         const auto value = [&](const char* name) { return nacre::test::value_of(text, name); };
-        if (nacre::test::read_number(text, "seed", settings.seed) || nacre::test::read_number(text, "count", settings.count)) continue;
+        if (nacre::test::read_number(text, "seed", settings.seed)) continue;
+        if (nacre::test::read_number(text, "count", settings.count)) continue;
         if (const auto folder = value("folder")) settings.folder = *folder;
         else if (text == "--in-process") settings.in_process = true;
         else if (text == "--chains") settings.chains = true;

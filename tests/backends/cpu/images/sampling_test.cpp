@@ -225,8 +225,8 @@ TEST_P(Sampling, FiltersAnisotropically) {
     }
 }
 
-// The reference averages over the same ellipses. A texel's weight may be that of the step below or above where a distance
-// rounds otherwise (1/512 of it), and another level may be taken where the logarithm is a whole number.
+// The reference averages over the same ellipses. A texel's weight may be that of the step below or above where a
+// distance rounds otherwise (1/512 of it), and another level may be taken where the logarithm is a whole number.
 TEST_P(Sampling, AveragesTheSameEllipsesInDouble) {
     const Shape& shape = GetParam();
     if (shape.dimension != ViewDimension::d2 && shape.dimension != ViewDimension::d2_array) return;

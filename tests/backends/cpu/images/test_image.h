@@ -171,7 +171,8 @@ inline std::vector<std::array<double, 4>> run_points_in_double(const ImageView* 
                 arguments.coordinates[i][lane] = std::bit_cast<float>(point.coordinates[i]);
             arguments.lod[lane] = point.lod, arguments.reference[lane] = point.reference;
             for (std::size_t i = 0; i < 3; ++i) {
-                arguments.gradient_x[i][lane] = point.gradient_x[i], arguments.gradient_y[i][lane] = point.gradient_y[i];
+                arguments.gradient_x[i][lane] = point.gradient_x[i];
+                arguments.gradient_y[i][lane] = point.gradient_y[i];
                 arguments.offset[i][lane] = point.offset[i];
             }
             arguments.min_lod[lane] = point.min_lod;
