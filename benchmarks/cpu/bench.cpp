@@ -152,6 +152,42 @@ std::string Bench::table() const {
     return text;
 }
 
+std::string Bench::markdown() const {
+    struct Row {
+        std::string name, ours, references, ratios, processor_ratios, of_fewer_lanes;
+        double target = 0.0;
+    };
+    std::vector<Row> rows;
+    for (const Result& result : results_) {
+        if (rows.empty() || rows.back().name != result.name) rows.push_back({.name = result.name});
+        Row& row = rows.back();
+        const auto add = [](std::string& cell, const char* separator, const std::string& text) {
+            cell += (cell.empty() ? "" : separator) + text;
+        };
+        if (result.lanes != lane_counts().front()) {
+            add(row.of_fewer_lanes, " / ", fmt::format("{:.2f}", result.ratio()));
+            continue;
+        }
+        row.ours = fmt::format("{:.1f} ms", result.cpu_ms);
+        const std::string reference = result.reference == "vulkan" ? "lavapipe"
+                                      : result.reference == "gl"   ? "llvmpipe"
+                                                                   : result.reference;
+        add(row.references, ", ", fmt::format("{} {:.0f} ms", reference, result.reference_ms));
+        add(row.ratios, " / ", fmt::format("{:.2f}", result.ratio()));
+        add(row.processor_ratios, " / ", fmt::format("{:.2f}", result.ratio_of_processor_time()));
+        row.target = result.target;
+    }
+    std::string text = fmt::format(
+        "| case | {} lanes | reference | ratio | of processor time | ratio, fewer lanes | target |\n"
+        "|---|---|---|---|---|---|---|\n",
+        lane_counts().front());
+    for (const Row& row : rows)
+        text += fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", row.name, row.ours, row.references, row.ratios,
+                            row.processor_ratios, row.of_fewer_lanes,
+                            row.target > 0.0 ? fmt::format("{:g}", row.target) : "");
+    return text;
+}
+
 Expected<void> Bench::write_report(const std::string& folder) const {
     Json cases = Json::array();
     for (const Result& result : results_) {
@@ -185,6 +221,7 @@ Expected<void> Bench::write_report(const std::string& folder) const {
                       {"devices", std::move(adapters)}};
     std::error_code problem;
     std::filesystem::create_directories(folder, problem);
+    NACRE_CHECK(write_file_atomically(folder + "/table.md", markdown()));
     return write_file_atomically(folder + "/report.json", report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

@@ -85,7 +85,9 @@ class Bench {
     [[nodiscard]] const std::vector<Result>& results() const { return results_; }
     /// The table, for people.
     [[nodiscard]] std::string table() const;
-    /// Writes report.json below the folder. Errors: input_output.
+    /// The same in Markdown, a row for each case, as docs/cpu-performance.md has it.
+    [[nodiscard]] std::string markdown() const;
+    /// Writes report.json and table.md below the folder. Errors: input_output.
     Expected<void> write_report(const std::string& folder) const;
 
   private:

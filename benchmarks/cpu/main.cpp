@@ -4,8 +4,9 @@
 //
 //     cpu_bench [--case PREFIX] [--rounds N] [--lanes N] [--quick] [--output FOLDER] [--assets FOLDER]
 //
-// Prints a table and writes FOLDER/report.json (out/bench-cpu by default). Ratios are reference over CPU backend: above 1 the
-// CPU backend is faster. Targets that are missed are marked and do not fail the run; a case that cannot be run does.
+// Prints a table and writes FOLDER/report.json and FOLDER/table.md (out/bench-cpu by default). Ratios are reference
+// over CPU backend: above 1 the CPU backend is faster. Targets that are missed are marked and do not fail the run; a
+// case that cannot be run does.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
