@@ -48,6 +48,17 @@ float film_reflected(float outer, float through, float inner, float inner_rest, 
     return (outer * inner_rest + inner * through - interfering) / max(1.0 - outer * inner, 1e-6);
 }
 
+// What the medium below lets in as seen from the film, by its reflectance in air, and the rest of that. It reflects all
+// where the bare one does: from 0.98 on, where an index tells no more, both fade towards that. 1 - f0 is exact there;
+// the difference of two numbers of 50 would leave metals few digits of what they let in.
+float passed_below_film(float f0, float film_ior) {
+    float ior = reflectance_to_ior(f0);
+    return 4.0 * ior * film_ior / square(ior + film_ior) * saturated(50.0 * (1.0 - f0));
+}
+float reflected_below_film(float f0, float film_ior) {
+    return mix(1.0, reflectance_under(f0, film_ior), saturated(50.0 * (1.0 - f0)));
+}
+
 // Of the interface under a film, by the cosine to its normal. thickness: meters.
 FilmShares film_shares(vec3 f0, float thickness, float film_ior, float cos_theta) {
     float c = saturated(cos_theta);
@@ -60,11 +71,9 @@ FilmShares film_shares(vec3 f0, float thickness, float film_ior, float cos_theta
     vec3 order_1 = film_interference(path);
     vec3 order_2 = film_interference(2.0 * path);
     float inside_rest = schlick_rest(inside, 1.0 - inside);
-    // Of the medium below as seen from the film: it reflects all where the bare one does.
-    vec3 below = vec3(mix(reflectance_under(f0.x, ior), 1.0, saturated(f0.x * 50.0 - 49.0)),
-                      mix(reflectance_under(f0.y, ior), 1.0, saturated(f0.y * 50.0 - 49.0)),
-                      mix(reflectance_under(f0.z, ior), 1.0, saturated(f0.z * 50.0 - 49.0)));
-    vec3 rest = (vec3(1.0) - below) * inside_rest;
+    vec3 below_rest = vec3(passed_below_film(f0.x, ior), passed_below_film(f0.y, ior), passed_below_film(f0.z, ior));
+    vec3 below = vec3(reflected_below_film(f0.x, ior), reflected_below_film(f0.y, ior), reflected_below_film(f0.z, ior));
+    vec3 rest = below_rest * inside_rest;
     vec3 inner = below * inside_rest + vec3(power5(1.0 - inside));
     // A reflection off a denser medium turns the phase by half a wave, off the film's upper side and, where what is
     // below is denser than the film, off its lower side: then both orders add up without a path.
