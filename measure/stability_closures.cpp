@@ -121,7 +121,7 @@ StabilitySubject closure_subject(std::string name, std::string what, std::uint32
         ClosurePoint point{.slab = slab, .view = view, .light = {0.0f, 0.0f, 1.0f}, .random = {}, .footprint = 1e-3f};
         put_point(point, words);
     };
-    subject.seed_word = offsetof(ClosurePoint, random) / 4;
+    subject.number_word = offsetof(ClosurePoint, random) / 4;
     return subject;
 }
 
