@@ -25,6 +25,10 @@ vec3 film_interference(float path) {
 // Below this the film fades: two orders of interference do not add up to the interface without it.
 const float thinnest_film = 3e-8;
 
+// What interference leaves at least of what it takes from: colors are wide bands, in which no path extinguishes all. Two
+// orders can come out at 0 or below, and what is left there would have but the digits that turns of a phase leave of it.
+const float least_left = 1.0 / 256.0;
+
 // Reflectance and 1 - reflectance, each with its digits where it is small.
 struct FilmShares {
     vec3 reflected;
@@ -36,7 +40,7 @@ struct FilmShares {
 float film_passed(float outer, float through, float inner, float inner_rest, float first_order, float second_order) {
     float amplitude = sqrt(outer * inner);
     float passed = through * inner_rest / max(1.0 - outer * inner, 1e-6);
-    return passed * (1.0 + 2.0 * amplitude * (first_order + amplitude * second_order));
+    return passed * max(1.0 + 2.0 * amplitude * (first_order + amplitude * second_order), least_left);
 }
 
 // The same for the reflectance: what cancels are numbers of its own size, where neither side reflects much. (Where
@@ -45,7 +49,8 @@ float film_reflected(float outer, float through, float inner, float inner_rest, 
                      float second_order) {
     float amplitude = sqrt(outer * inner);
     float interfering = 2.0 * through * inner_rest * amplitude * (first_order + amplitude * second_order);
-    return (outer * inner_rest + inner * through - interfering) / max(1.0 - outer * inner, 1e-6);
+    float both = outer * inner_rest + inner * through;
+    return max(both - interfering, least_left * both) / max(1.0 - outer * inner, 1e-6);
 }
 
 // What the medium below lets in as seen from the film, by its reflectance in air, and the rest of that. It reflects all
@@ -101,10 +106,11 @@ Fresnel make_film_fresnel(Fresnel bare, float thickness, float film_ior, float c
     Fresnel fresnel = bare;
     fresnel.grazing = max(bare.grazing, vec3(saturated(ior_to_reflectance(max(film_ior, 1.0)) / smallest_reflectance)));
     float rest = schlick_rest(c, 1.0 - c);
-    vec3 bright = vec3(1.0) - clamp((film.passed - (vec3(1.0) - fresnel.grazing) * m5) / rest, vec3(0.0), vec3(1.0));
-    vec3 dark = clamp((film.reflected - fresnel.grazing * m5) / rest, vec3(0.0), vec3(1.0));
-    vec3 normal = vec3(film.passed.x < 0.5 ? bright.x : dark.x, film.passed.y < 0.5 ? bright.y : dark.y,
-                       film.passed.z < 0.5 ? bright.z : dark.z);
+    vec3 let_in = clamp((film.passed - (vec3(1.0) - fresnel.grazing) * m5) / rest, vec3(0.0), vec3(1.0));
+    // The curve's other end is subtracted: of what that leaves, least_left again.
+    vec3 dark = min(max((film.reflected - fresnel.grazing * m5) / rest, least_left * film.reflected), vec3(1.0));
+    vec3 normal = vec3(let_in.x < 0.5 ? 1.0 - let_in.x : dark.x, let_in.y < 0.5 ? 1.0 - let_in.y : dark.y,
+                       let_in.z < 0.5 ? 1.0 - let_in.z : dark.z);
     float share = smoothstep(0.0, thinnest_film, thickness);
     fresnel.normal = mix(bare.normal, normal, share);
     fresnel.grazing = mix(bare.grazing, fresnel.grazing, share);
