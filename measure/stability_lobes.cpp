@@ -278,8 +278,6 @@ std::vector<StabilitySubject> lobe_subjects() {
                          shares.passed.y < 0.5 ? 1.0 - shares.passed.y : shares.reflected.y,
                          shares.passed.z < 0.5 ? 1.0 - shares.passed.z : shares.reflected.z));)",
                          std::vector<ResultKind>(12, share)));
-        s.tolerance = 1e-2;
-        s.note = "As of thin-film: where two reflections extinguish each other, what is left has the digits of a phase.";
         // What a shader makes of a point must be the same in both precisions.
         s.make_point = [](Random& random, std::uint32_t* words) {
             make_lobe_point(random, words);

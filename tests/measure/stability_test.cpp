@@ -129,6 +129,21 @@ TEST(Stability, FindsTheTextbookDistribution) {
     EXPECT_THAT(figures->at, HasSubstr("roughness"));
 }
 
+// Some devices fuse products and sums, which hides differences of rounded products: this one does not.
+TEST(Stability, FilmsKeepTheirDigitsWhereNothingIsFused) {
+    const rhi::Instance instance(all_backends());
+    const auto device = instance.create_device({.backend = "cpu:consistent"});
+    const auto reference = instance.create_device({.backend = "cpu:double"});
+    ASSERT_TRUE(device) << device.error().message();
+    ASSERT_TRUE(reference) << reference.error().message();
+    const auto subjects = lobe_subjects();
+    const auto film = std::ranges::find(subjects, "lobe-film", &StabilitySubject::name);
+    ASSERT_NE(film, subjects.end());
+    const auto figures = measure_subject(**device, **reference, *film, 200'000, 7);
+    ASSERT_TRUE(figures) << figures.error().message();
+    EXPECT_LT(figures->max_rel_error, 1e-3) << figures->at;
+}
+
 TEST(Stability, TooFewPointsAndUnknownNamesAreErrors) {
     const rhi::Instance instance(all_backends());
     const auto none = measure_stability(instance, {.points = 0});
