@@ -121,7 +121,7 @@ StabilitySubject closure_subject(std::string name, std::string what, std::uint32
         ClosurePoint point{.slab = slab, .view = view, .light = {0.0f, 0.0f, 1.0f}, .random = {}, .footprint = 1e-3f};
         put_point(point, words);
     };
-    subject.seed_word = offsetof(ClosurePoint, random) / 4;
+    subject.number_word = offsetof(ClosurePoint, random) / 4;
     return subject;
 }
 
@@ -261,10 +261,6 @@ std::vector<StabilitySubject> closure_subjects() {
         }
         add_samplings(s, {.f0 = glm::vec3(0.1f), .film_thickness = 3e-7f}, {0.3f});
         s.share = 2.0;
-        s.tolerance = 1e-2;
-        s.note =
-            "What interferes is told by the fraction of up to 13 turns of a phase; where two reflections nearly extinguish "
-            "each other, the digits of that fraction are those of the reflectance.";
     }
     {
         auto& s = add(closure_subject("specular-table", "A tint by the angles of view and light.", slab_specular_lut));
