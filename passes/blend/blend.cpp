@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "passes/render_pass.h"
+#include "passes/geometry_draws.h"
 
 /// @file
 /// Blend: surfaces of alpha mode BLEND, lit in their fragment shader and laid over the picture from far to near (by the
@@ -41,7 +41,6 @@ class Blend final : public RenderPass {
                  .closure_shader = "passes/closures/blend_"};
         desc_.defines.push_back({"HAS_POSITIONS"});
         FrameResources& resources = context.resources;
-        camera_ = resources.camera;
         if (packed_) {
             desc_.defines.push_back({"PACKED"});
             desc_.color_targets = {{.format = rhi::Format::r32_uint}, {.format = rhi::Format::r32_uint}};
@@ -173,7 +172,6 @@ class Blend final : public RenderPass {
     rhi::Device& device_;
     bool packed_;
     rhi::BindGroup group_;
-    BufferId camera_;
     TextureId color_, coverage_;
     GeometryPassDesc desc_;
     std::vector<std::uint32_t> sorted_;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "passes/hit_materials.h"
-#include "passes/render_pass.h"
+#include "passes/geometry_draws.h"
 
 /// @file
 /// Shades what the camera sees a second time, as hits of rays are shaded: the rasterizer only writes down places (what

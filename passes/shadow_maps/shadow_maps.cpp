@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include "passes/render_pass.h"
+#include "passes/geometry_draws.h"
 
 /// @file
 /// Shadow maps: one depth texture with a layer for each view (one for directional and spot lights, six around a point

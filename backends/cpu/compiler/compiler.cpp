@@ -54,19 +54,13 @@ class ShaderCompilation final : public Compiler {
         std::vector<NarrowedOperation> narrowed;
         NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Vertex, input, narrowed,
                                 [&](llvm::Module& target, const Module& module) {
-                                    VertexEmitter emitter(target, module, all_.options, all_.generator->math_options(), source.slots, input);
+                                    VertexEmitter emitter(target, module, all_.options,
+                                                          all_.generator->math_options(), source.slots, input);
                                     emitter.emit();
                                     program = emitter.program;
                                     return Emitted{false, emitter.narrowed()};
                                 }));
-        program.in_double = all_.options.mode == ExecutionMode::double_precision;
-        program.narrowed = std::move(narrowed);
-        program.name = std::string(source.name);
-        if (!code) return program;
-        program.run = reinterpret_cast<VertexFunction>(static_cast<LoadedCode&>(*code).find("kernel"));
-        program.code = std::move(code);
-        if (!program.run) return missing(source);
-        return program;
+        return with_entry(std::move(program), std::move(code), std::move(narrowed), source);
     }
 
     Expected<FragmentProgram> compile_fragment(const ShaderSource& source) override {
@@ -75,20 +69,14 @@ class ShaderCompilation final : public Compiler {
         std::vector<NarrowedOperation> narrowed;
         NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Fragment, {}, narrowed,
                                 [&](llvm::Module& target, const Module& module) {
-                                    FragmentEmitter emitter(target, module, all_.options, all_.generator->math_options(), source.slots);
+                                    FragmentEmitter emitter(target, module, all_.options,
+                                                            all_.generator->math_options(), source.slots);
                                     emitter.trace_table = source.trace;
                                     emitter.emit();
                                     program = emitter.program;
                                     return Emitted{false, emitter.narrowed()};
                                 }));
-        program.in_double = all_.options.mode == ExecutionMode::double_precision;
-        program.narrowed = std::move(narrowed);
-        program.name = std::string(source.name);
-        if (!code) return program;
-        program.run = reinterpret_cast<FragmentFunction>(static_cast<LoadedCode&>(*code).find("kernel"));
-        program.code = std::move(code);
-        if (!program.run) return missing(source);
-        return program;
+        return with_entry(std::move(program), std::move(code), std::move(narrowed), source);
     }
 
   private:
@@ -133,6 +121,20 @@ class ShaderCompilation final : public Compiler {
         return program;
     }
 
+    /// A program of one stage of drawing with what `compile` gave for it.
+    template <typename Program>
+    Expected<Program> with_entry(Program program, std::shared_ptr<CompiledCode> code,
+                                 std::vector<NarrowedOperation> narrowed, const ShaderSource& source) const {
+        program.in_double = all_.options.mode == ExecutionMode::double_precision;
+        program.narrowed = std::move(narrowed);
+        program.name = std::string(source.name);
+        if (!code) return program;
+        program.run = reinterpret_cast<decltype(program.run)>(static_cast<LoadedCode&>(*code).find("kernel"));
+        program.code = std::move(code);
+        if (!program.run) return missing(source);
+        return program;
+    }
+
     /// As all_, with fewer lanes.
     Expected<const Variant*> with_lanes(std::uint32_t lanes) {
         const std::lock_guard lock(fewer_lanes_mutex_);
@@ -145,8 +147,8 @@ class ShaderCompilation final : public Compiler {
     }
 
     static std::unexpected<Error> missing(const ShaderSource& source) {
-        return fail(ErrorCode::internal, "compile shader", fmt::format("'{}'", source.name), "the code that was made has no entry",
-                    "Purge the cache (nacre cache --purge) and try again.");
+        return fail(ErrorCode::internal, "compile shader", fmt::format("'{}'", source.name),
+                    "the code that was made has no entry", "Purge the cache (nacre cache --purge) and try again.");
     }
 
     struct Emitted {

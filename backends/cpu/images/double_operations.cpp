@@ -7,29 +7,12 @@
 
 #include "backends/cpu/images/double_texels.h"
 #include "backends/cpu/images/format_plan.h"
+#include "backends/cpu/images/view_axes.h"
 
 namespace nacre::cpu {
 namespace {
 
 constexpr double farthest_texel = 4194304.0;
-
-struct Axes {
-    int spatial = 2;  ///< Coordinates besides the layer; cubes: 3.
-    bool is_cube = false, has_layers = false;
-};
-
-Axes axes_of(rhi::ViewDimension dimension) {
-    using enum rhi::ViewDimension;
-    switch (dimension) {
-        case d1: return {1, false, false};
-        case d1_array: return {1, false, true};
-        case d2_array: return {2, false, true};
-        case d3: return {3, false, false};
-        case cube: return {3, true, false};
-        case cube_array: return {3, true, true};
-        default: return {2, false, false};
-    }
-}
 
 /// Whole numbers from coordinates of any kind: NaN counts as 0, and nothing is farther away than texels can be.
 std::int64_t whole(double value) {

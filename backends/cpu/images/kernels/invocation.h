@@ -3,6 +3,7 @@
 #pragma once
 
 #include "backends/cpu/images/kernels/texel_codecs.h"
+#include "backends/cpu/images/view_axes.h"
 #include "backends/cpu/shader_interface.h"
 
 namespace nacre::cpu::NACRE_KERNEL_NAMESPACE {
@@ -35,25 +36,6 @@ NACRE_INLINE void write_result(const Invocation& call, const Floats<W>* channels
 template <int W>
 NACRE_INLINE void write_zeros(const Invocation& call) {
     for (int c = 0; c < 4; ++c) store_lanes<W>(call.arguments->result[c] + call.first_lane, splat<W>(0));
-}
-
-/// Shape of the coordinates of a view.
-struct Axes {
-    int spatial = 2;  ///< Coordinates besides the layer; cubes: 3.
-    bool is_cube = false;
-    bool has_layers = false;  ///< A layer follows.
-};
-NACRE_INLINE Axes axes_of(rhi::ViewDimension dimension) {
-    using enum rhi::ViewDimension;
-    switch (dimension) {
-        case d1: return {1, false, false};
-        case d1_array: return {1, false, true};
-        case d2_array: return {2, false, true};
-        case d3: return {3, false, false};
-        case cube: return {3, true, false};
-        case cube_array: return {3, true, true};
-        default: return {2, false, false};
-    }
 }
 
 NACRE_INLINE int first_bit(std::uint32_t bits) { return __builtin_ctz(bits); }
