@@ -20,6 +20,7 @@ Slab next_slab() {
     slab.albedo = next3();
     float anisotropy = next();
     vec3 f90 = next3();
+    float specular_weight = next();
     vec3 f82 = next3();
     float second_roughness = next();
     float second_weight = next();
@@ -45,6 +46,7 @@ Slab next_slab() {
 #endif
 #ifdef NACRE_SLAB_F90
     slab.f90 = f90;
+    slab.specular_weight = specular_weight;
 #endif
 #ifdef NACRE_SLAB_F82
     slab.f82 = f82;

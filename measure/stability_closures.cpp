@@ -32,7 +32,8 @@ std::string describe_closure(const std::uint32_t* words) {
                                    s.f0.y, s.f0.z, s.roughness, s.albedo.x, s.albedo.y, s.albedo.z);
     const auto has = [&](std::uint32_t feature) { return (s.features & feature) != 0; };
     if (has(slab_anisotropy)) text += fmt::format(", anisotropy {:.9g}", s.anisotropy);
-    if (has(slab_f90)) text += fmt::format(", f90 {:.7g} {:.7g} {:.7g}", s.f90.x, s.f90.y, s.f90.z);
+    if (has(slab_f90))
+        text += fmt::format(", f90 {:.7g} {:.7g} {:.7g}, weight {:.7g}", s.f90.x, s.f90.y, s.f90.z, s.specular_weight);
     if (has(slab_f82)) text += fmt::format(", f82 {:.7g} {:.7g} {:.7g}", s.f82.x, s.f82.y, s.f82.z);
     if (has(slab_second_lobe))
         text += fmt::format(", second roughness {:.9g} weight {:.7g}", s.second_roughness, s.second_weight);
