@@ -158,7 +158,7 @@ TEST(Stability, TooFewPointsAndUnknownNamesAreErrors) {
 // Samples of a cosine lobe pass against its own density, and not against one that is wrong by 1 %, nor against another.
 TEST(ChiSquareTest, TellsOnePercent) {
     const auto cosine = [](const glm::dvec3& w) { return std::max(w.z, 0.0) / std::numbers::pi; };
-    const DirectionBins bins{.rings = 40, .smallest_angle = 0.5, .tolerance = 1e-4, .subdivisions = 10};
+    const DirectionBins bins{.rings = 40, .smallest_angle = 0.5};
     ChiSquareTest test(bins, cosine);
     ChiSquareTest other(bins, [](const glm::dvec3& w) { return w.z > 0.0 ? 0.5 / std::numbers::pi : 0.0; });
     Random random(3);
