@@ -215,6 +215,7 @@ Expected<void> measure_furnaces(const StabilitySubject& subject, bool is_short, 
     if (subject.furnace) {
         NACRE_TRY(const auto range, subject.furnace(is_short));
         row.has_furnace = true;
+        row.has_lossless = subject.is_furnace_lossless;
         row.furnace_min = range.first;
         row.furnace_max = range.second;
         return {};
@@ -486,6 +487,8 @@ std::vector<std::string> violations_of(const StabilityReport& report) {
         if (f.closed_error > c.tolerance) add(c, fmt::format("off the closed form by {:.3g}", f.closed_error));
         if (c.has_furnace && c.furnace_max > c.limits.furnace)
             add(c, fmt::format("sends out {:.5f} of white light", c.furnace_max));
+        if (c.has_lossless && c.furnace_min < c.limits.lossless)
+            add(c, fmt::format("sends out only {:.5f} of white light, absorbing nothing", c.furnace_min));
         if (f.reciprocity > c.limits.reciprocity) add(c, fmt::format("two directions differ by {:.3g}", f.reciprocity));
         if (f.weight_max > c.limits.weight) add(c, fmt::format("a sample's weight of {:.7g}", f.weight_max));
         if (f.agreement > 1e-4) add(c, fmt::format("sample, value and density differ by {:.3g}", f.agreement));

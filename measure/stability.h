@@ -59,10 +59,11 @@ struct StabilityFigures {
     void add(const StabilityFigures& other);
 };
 
-/// What a row promises besides small errors; infinite where it promises nothing.
+/// What a row promises besides small errors; infinite (0 for `lossless`) where it promises nothing.
 struct StabilityLimits {
     static constexpr double none = std::numeric_limits<double>::infinity();
     double furnace = 1.001;      ///< Energy under white light.
+    double lossless = 0.998;     ///< The least of it that what absorbs nothing sends out, where a row has some.
     double reciprocity = none;   ///< Relative defect: of lobes that scatter once.
     double weight = none;        ///< Of a sample: of lobes without compensation.
 };
