@@ -21,7 +21,7 @@ namespace nacre::measure {
 /// Rings around an axis whose angles grow exponentially, so that narrow lobes around the axis get as many bins as wide
 /// ones, each of twice as many sectors as there are rings.
 struct DirectionBins {
-    int rings = 80;
+    int rings = 80;  ///< A multiple of 8.
     glm::dvec3 axis{0.0, 0.0, 1.0};  ///< Unit.
     double smallest_angle = 1e-3;    ///< Radians; rings are not much thinner.
     /// Error of the integral of the density over a bin, in standard deviations of the number of samples in it. A

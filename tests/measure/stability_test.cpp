@@ -181,7 +181,7 @@ TEST(ChiSquareTest, TellsOnePercent) {
 // to a part of what their counts vary by.
 TEST(ChiSquareTest, BinsEndAtTheSurface) {
     const auto density = [](const glm::dvec3& w) { return w.z > 0.0 ? 0.5 / std::numbers::pi : 0.0; };
-    const DirectionBins bins{.rings = 10, .axis = {std::sqrt(1.0 - 0.09), 0.0, 0.3}, .smallest_angle = 0.5};
+    const DirectionBins bins{.rings = 16, .axis = {std::sqrt(1.0 - 0.09), 0.0, 0.3}, .smallest_angle = 0.5};
     ChiSquareTest test(bins, density);
     Random random(4);
     const int samples = 1'000'000;
