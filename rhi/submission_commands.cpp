@@ -8,14 +8,6 @@
 #include "rhi/submission_walk.h"
 
 namespace nacre::rhi {
-namespace {
-
-SubresourceRange range_of(const ViewReference& view) {
-    return {view.base_mip, view.mip_count, view.base_layer, view.layer_count};
-}
-
-}  // namespace
-
 SubmissionWalk::Step SubmissionWalk::copy_scope(CommandHeader& header) {
     tracker_.end_scope(&header);
     note_statement();
@@ -259,7 +251,7 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
             TextureObject* texture = nullptr;
             if (auto failed = resolve_view(view, attempted, texture, false)) return failed;
             tracker_.begin_scope();
-            if (auto failed = use(attempted, *texture, range_of(view), destination, true)) return failed;
+            if (auto failed = use(attempted, *texture, view.range(), destination, true)) return failed;
             return copy_scope(header);
         }
         case CommandType::generate_mips: {
