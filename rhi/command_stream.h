@@ -46,8 +46,6 @@ struct ViewReference {
     ViewDimension dimension = ViewDimension::d2;
     Format format = Format::undefined;
     std::uint32_t base_mip = 0, mip_count = 1, base_layer = 0, layer_count = 1;
-
-    [[nodiscard]] SubresourceRange range() const { return {base_mip, mip_count, base_layer, layer_count}; }
 };
 
 enum class CommandType : std::uint16_t {

@@ -251,7 +251,7 @@ SubmissionWalk::Step SubmissionWalk::visit(CommandHeader& header, std::byte* pay
             TextureObject* texture = nullptr;
             if (auto failed = resolve_view(view, attempted, texture, false)) return failed;
             tracker_.begin_scope();
-            if (auto failed = use(attempted, *texture, view.range(), destination, true)) return failed;
+            if (auto failed = use(attempted, *texture, range_of(view), destination, true)) return failed;
             return copy_scope(header);
         }
         case CommandType::generate_mips: {

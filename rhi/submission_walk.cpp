@@ -106,7 +106,7 @@ SubmissionWalk::Step SubmissionWalk::begin_pass(CommandHeader& header, BeginRend
         TextureObject* texture = nullptr;
         if (auto failed = resolve_view(color.view, "begin render pass", texture, true)) return failed;
         note_extent(*texture, color.view);
-        if (auto failed = use("begin render pass", *texture, color.view.range(), {ResourceUse::color_target, {}},
+        if (auto failed = use("begin render pass", *texture, range_of(color.view), {ResourceUse::color_target, {}},
                               color.load != LoadOperation::load))
             return failed;
         if (!color.resolve.texture.handle) {
@@ -114,7 +114,7 @@ SubmissionWalk::Step SubmissionWalk::begin_pass(CommandHeader& header, BeginRend
             continue;
         }
         if (auto failed = resolve_view(color.resolve, "begin render pass", texture, true)) return failed;
-        if (auto failed = use("begin render pass", *texture, color.resolve.range(),
+        if (auto failed = use("begin render pass", *texture, range_of(color.resolve),
                               {ResourceUse::resolve_destination, {}}, true))
             return failed;
     }
@@ -127,7 +127,7 @@ SubmissionWalk::Step SubmissionWalk::begin_pass(CommandHeader& header, BeginRend
             command.depth_load != LoadOperation::load && (!has_stencil || command.stencil_load != LoadOperation::load);
         const ResourceUse depth_use =
             command.read_only ? ResourceUse::depth_stencil_read : ResourceUse::depth_stencil_write;
-        if (auto failed = use("begin render pass", *texture, command.depth_stencil.range(), {depth_use, {}},
+        if (auto failed = use("begin render pass", *texture, range_of(command.depth_stencil), {depth_use, {}},
                               discard && !command.read_only))
             return failed;
     }
