@@ -468,8 +468,9 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
         }
         NACRE_CHECK(measure_furnaces(subject, is_short, *row));
         NACRE_CHECK(test_samplers(*devices.front(), subject, report.samples, first, is_short, limit, *row));
+        report.seconds = seconds_since(start);
+        if (desc.on_progress) desc.on_progress(report);
     }
-    report.seconds = seconds_since(start);
     return report;
 }
 
