@@ -300,6 +300,19 @@ NACRE_LANES_INLINE Floats absolute(const Floats& a) { return floats_of_bits(bits
 
 #undef NACRE_EACH
 
+/// A number as a type: `at` is a constant where it is used.
+template <int number>
+struct Index {
+    static constexpr int at = number;
+};
+/// Calls `work` with Index<0>, Index<1>, ... one after the other: a loop that is unrolled for certain, so that arrays over
+/// its index stay in registers.
+template <int count, typename Work>
+NACRE_LANES_INLINE void unrolled(const Work& work) {
+    if constexpr (count > 1) unrolled<count - 1>(work);
+    if constexpr (count > 0) work(Index<count - 1>{});
+}
+
 /// Four floats or integers, as the rows of a vertex or plane, or the pixels of a quad.
 using Float4 [[gnu::vector_size(16)]] = float;
 using Int4 [[gnu::vector_size(16)]] = std::int32_t;

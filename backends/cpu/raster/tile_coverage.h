@@ -300,21 +300,21 @@ struct Coverage {
     [[gnu::always_inline]] void run_few_blocks(const SmallTriangles& from, std::uint32_t lane, std::int32_t first_x,
                                                std::int32_t first_y) {
         constexpr int count = columns * rows;
-        const auto column = [](int i) { return i % columns; };
-        const auto row = [](int i) { return i / columns; };
         const Record& record = *run.record;
         const DrawPlan& draw = *run.draw;
         Ints edges_at[count];
-        for (int i = 0; i < 3; ++i) {
-            const Ints along_x = ints(from.along_x[i][lane]), along_y = ints(from.along_y[i][lane]);
+        unrolled<3>([&](auto edge) {
+            const Ints along_x = ints(from.along_x[edge.at][lane]), along_y = ints(from.along_y[edge.at][lane]);
             const Ints right = shift_left<2>(along_x), down = shift_left<2>(along_y);
             Ints at[count];
-            at[0] = along_x * load(lane_x) + along_y * load(lane_y) + ints(from.at_block[i][lane]);
-            for (int block = 1; block < count; ++block)
-                at[block] = column(block) != 0 ? at[block - 1] + right : at[block - columns] + down;
-            for (int block = 0; block < count; ++block)
-                edges_at[block] = i == 0 ? at[block] : edges_at[block] | at[block];
-        }
+            at[0] = along_x * load(lane_x) + along_y * load(lane_y) + ints(from.at_block[edge.at][lane]);
+            if constexpr (columns == 2) at[1] = at[0] + right;
+            if constexpr (rows == 2) at[columns] = at[0] + down;
+            if constexpr (count == 4) at[3] = at[1] + down;
+            unrolled<count>([&](auto block) {
+                edges_at[block.at] = edge.at == 0 ? at[block.at] : edges_at[block.at] | at[block.at];
+            });
+        });
         // As in TileRun::depth_at.
         const Floats x = to_floats(load(lane_x)) + floats(static_cast<float>(run.tile_x + 4 * first_x) + 0.5f);
         const Floats y = to_floats(load(lane_y)) + floats(static_cast<float>(run.tile_y + 4 * first_y) + 0.5f);
@@ -325,18 +325,19 @@ struct Coverage {
         if constexpr (columns == 2) in_x[1] = c + dx * (x + floats(4.0f) - from_x);
         if constexpr (rows == 2) in_y[1] = dy * (y + floats(4.0f) - from_y);
         const std::uint32_t place = block_place(first_x, first_y);
-        std::uint32_t offsets[count];
-        for (int i = 0; i < count; ++i) offsets[i] = four_blocks[2 * row(i) + column(i)];
         std::int32_t* const depth = run.memory.depth[0] + place;
         const DepthLayout layout = run.targets.depth_layout;
         Ints keys[count], old[count];
-        for (int i = 0; i < count; ++i) {
-            keys[i] = depth_key(layout, in_x[column(i)] + in_y[row(i)], run.depth_low, run.depth_high);
-            old[i] = load(depth + offsets[i]);
-        }
+        unrolled<count>([&](auto block) {
+            constexpr int column = block.at % columns, row = block.at / columns;
+            keys[block.at] = depth_key(layout, in_x[column] + in_y[row], run.depth_low, run.depth_high);
+            old[block.at] = load(depth + four_blocks[2 * row + column]);
+        });
         Lanes passes[count];
         const auto test = [&](auto&& comparison) {
-            for (int i = 0; i < count; ++i) passes[i] = not_negative(edges_at[i]) & comparison(keys[i], old[i]);
+            unrolled<count>([&](auto block) {
+                passes[block.at] = not_negative(edges_at[block.at]) & comparison(keys[block.at], old[block.at]);
+            });
         };
         switch (draw.depth_stencil.compare) {
             case rhi::CompareOperation::less: test([](Ints key, Ints at) { return less(key, at); }); break;
@@ -348,25 +349,27 @@ struct Coverage {
         }
         std::uint32_t masks[count];
         std::uint64_t all = 0;
-        for (int i = 0; i < count; ++i) {
-            masks[i] = mask_of(passes[i]);
-            all |= static_cast<std::uint64_t>(masks[i]) << (16 * i);
-        }
+        unrolled<count>([&](auto block) {
+            masks[block.at] = mask_of(passes[block.at]);
+            all |= static_cast<std::uint64_t>(masks[block.at]) << (16 * block.at);
+        });
         if (draw.depth_stencil.depth_write) {
-            for (int i = 0; i < count; ++i) {
-                store(depth + offsets[i], select(passes[i], keys[i], old[i]));
-                const std::uint32_t bit = (masks[i] != 0 ? 1u : 0u) << (first_x + column(i));
-                std::uint16_t& written = run.written_blocks[first_y + row(i)];
+            unrolled<count>([&](auto block) {
+                constexpr int column = block.at % columns, row = block.at / columns;
+                store(depth + four_blocks[2 * row + column], select(passes[block.at], keys[block.at], old[block.at]));
+                const std::uint32_t bit = (masks[block.at] != 0 ? 1u : 0u) << (first_x + column);
+                std::uint16_t& written = run.written_blocks[first_y + row];
                 written = static_cast<std::uint16_t>(written | bit);
-            }
+            });
         }
         if (all == 0) return;
         run.memory.passed_samples += static_cast<std::uint32_t>(__builtin_popcountll(all));
         if (!draw.shades) return;
         std::uint32_t regions = 0;
-        for (int i = 0; i < count; ++i)
-            regions |= 1u << ((first_y + row(i)) / region_blocks * regions_across +
-                              (first_x + column(i)) / region_blocks);
+        unrolled<count>([&](auto block) {
+            constexpr int column = block.at % columns, row = block.at / columns;
+            regions |= 1u << ((first_y + row) / region_blocks * regions_across + (first_x + column) / region_blocks);
+        });
         run.append_blocks<columns, rows>(place, masks, regions);
     }
 

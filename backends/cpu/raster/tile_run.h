@@ -427,8 +427,9 @@ struct TileRun {
         Stream& stream = memory.streams[0];
         const PrimitiveData* const from = &current_primitive();
         repeat_pointer<4 * columns * rows>(stream.primitives + stream.quads, from);
-        for (int block = 0; block < columns * rows; ++block)
-            append_quads(stream, place + four_blocks[2 * (block / columns) + block % columns], live[block]);
+        unrolled<columns * rows>([&](auto block) {
+            append_quads(stream, place + four_blocks[2 * (block.at / columns) + block.at % columns], live[block.at]);
+        });
         if (stream.quads >= stream_quads) flush_stream(0, stream_quads);
     }
     template <int count>
