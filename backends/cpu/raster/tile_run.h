@@ -204,15 +204,15 @@ struct TileRun {
         flush();
         for (std::uint32_t i = 0; i < targets.color_count; ++i)
             if (targets.colors[i].data) store_colors(targets.colors[i], loaded_regions[i]);
-        if (targets.streams_colors) end_streams();
         const bool depth_clears = clears && targets.depth_clears, stencil_clears = clears && targets.stencil_clears;
+        // Depth goes the way of the colors: what is too large to stay in the caches need not be read into them.
         for (std::uint32_t sample = 0; sample < targets.samples; ++sample) {
             if (depth_changed || (depth_clears && depth_loaded))
                 store_pixels(depth_bytes(), depth_texels(sample), targets.depth_row_stride,
-                             plane_area(memory.depth, sample), false);
+                             plane_area(memory.depth, sample), targets.streams_colors);
             else if (depth_clears)
                 fill_texels(&targets.clear_depth, depth_bytes(), depth_texels(sample), targets.depth_row_stride, width,
-                            height, false);
+                            height, targets.streams_colors);
             if (stencil_changed || (stencil_clears && stencil_loaded))
                 store_pixels(1, stencil_texels(sample), targets.stencil_row_stride, plane_area(memory.stencil, sample),
                              false);
@@ -220,6 +220,7 @@ struct TileRun {
                 fill_texels(&targets.clear_stencil, 1, stencil_texels(sample), targets.stencil_row_stride, width,
                             height, false);
         }
+        if (targets.streams_colors) end_streams();
     }
 
     void begin_draw(std::uint32_t index) {
