@@ -47,23 +47,21 @@ struct SmallTriangles {
     std::uint32_t cut;    ///< Blocks of the tile hold others too.
 
     void prepare(const TileRun& run, const Record* const* records, std::uint32_t count) {
-        alignas(64) std::int32_t words[8][16];
-        for (std::uint32_t lane = 0; lane < 16; lane += 4)
-            for (int row = 0; row < 2; ++row) {
-                Int4 lines[4];
-                for (std::uint32_t i = 0; i < 4; ++i)
-                    lines[i] =
-                        load4(reinterpret_cast<const std::byte*>(records[lane + i < count ? lane + i : 0]) + 16 * row);
-                transpose(lines[0], lines[1], lines[2], lines[3]);
-                for (int i = 0; i < 4; ++i) store4(words[4 * row + i] + lane, lines[i]);
-            }
+        Ints words[2][4];
+        unrolled<2>([&](auto row) {
+            load_rows(
+                [&](int lane) {
+                    const std::uint32_t from = static_cast<std::uint32_t>(lane) < count ? lane : 0;
+                    return reinterpret_cast<const std::byte*>(records[from]) + 16 * row.at;
+                },
+                words[row.at]);
+        });
         static_assert(offsetof(Record, x) == 0 && offsetof(Record, y) == 12);
         // From the center of the tile's first pixel.
-        Ints x[3], y[3];
-        for (int i = 0; i < 3; ++i) {
-            x[i] = load(words[i]) - ints(run.tile_x * subpixels + subpixels / 2);
-            y[i] = load(words[3 + i]) - ints(run.tile_y * subpixels + subpixels / 2);
-        }
+        const Ints center_x = ints(run.tile_x * subpixels + subpixels / 2);
+        const Ints center_y = ints(run.tile_y * subpixels + subpixels / 2);
+        const Ints x[3] = {words[0][0] - center_x, words[0][1] - center_x, words[0][2] - center_x};
+        const Ints y[3] = {words[0][3] - center_y, words[1][0] - center_y, words[1][1] - center_y};
         const auto bounds = [&](const Ints(&at)[3], std::int32_t begin, std::int32_t turned_last, Ints& low, Ints& high,
                                 Lanes& is_small, Lanes& is_whole) {
             const Ints first =
@@ -275,8 +273,10 @@ struct Coverage {
         x0 = from.first_x[lane], x1 = from.last_x[lane], y0 = from.first_y[lane], y1 = from.last_y[lane];
         const DrawPlan& draw = *run.draw;
         const std::int32_t region_x = x0 / 16, region_y = y0 / 16;
-        if (draw.hierarchical && run.depth && region_x == x1 / 16 && region_y == y1 / 16 &&
-            run.hidden(region_x, region_y, x0, x1, y0, y1, true))
+        // What lies in one region is hard to guess, whether anything may be hidden is not: it is asked first.
+        if (draw.hierarchical && run.depth && run.may_hide(region_x, region_y, true) && region_x == x1 / 16 &&
+            region_y == y1 / 16 &&
+            run.hidden(run.region_bounds[region_y * regions_across + region_x], x0, x1, y0, y1))
             return;
         bounded = (from.cut >> lane & 1) != 0;
         const std::int32_t left = x0 / 4, right = x1 / 4, top = y0 / 4, bottom = y1 / 4;
@@ -347,30 +347,29 @@ struct Coverage {
             case rhi::CompareOperation::equal: test([](Ints key, Ints at) { return equal(key, at); }); break;
             default: test([&](Ints key, Ints at) { return compare(draw.depth_stencil.compare, key, at); }); break;
         }
-        std::uint32_t masks[count];
         std::uint64_t all = 0;
         unrolled<count>([&](auto block) {
-            masks[block.at] = mask_of(passes[block.at]);
-            all |= static_cast<std::uint64_t>(masks[block.at]) << (16 * block.at);
+            all |= static_cast<std::uint64_t>(mask_of(passes[block.at])) << (16 * block.at);
         });
+        if (all == 0) return;
         if (draw.depth_stencil.depth_write) {
             unrolled<count>([&](auto block) {
                 constexpr int column = block.at % columns, row = block.at / columns;
                 store(depth + four_blocks[2 * row + column], select(passes[block.at], keys[block.at], old[block.at]));
-                const std::uint32_t bit = (masks[block.at] != 0 ? 1u : 0u) << (first_x + column);
-                std::uint16_t& written = run.written_blocks[first_y + row];
-                written = static_cast<std::uint16_t>(written | bit);
             });
+            // Of some of them perhaps nothing was, which does no harm.
+            for (int row = 0; row < rows; ++row) {
+                std::uint16_t& written = run.written_blocks[first_y + row];
+                written = static_cast<std::uint16_t>(written | (columns == 2 ? 3u : 1u) << first_x);
+            }
         }
-        if (all == 0) return;
         run.memory.passed_samples += static_cast<std::uint32_t>(__builtin_popcountll(all));
         if (!draw.shades) return;
-        std::uint32_t regions = 0;
-        unrolled<count>([&](auto block) {
-            constexpr int column = block.at % columns, row = block.at / columns;
-            regions |= 1u << ((first_y + row) / region_blocks * regions_across + (first_x + column) / region_blocks);
-        });
-        run.append_blocks<columns, rows>(place, masks, regions);
+        const auto region_of = [](std::int32_t block) { return block / region_blocks; };
+        const std::uint32_t across = 1u << region_of(first_x) | 1u << region_of(first_x + columns - 1);
+        const std::uint32_t regions = across << regions_across * region_of(first_y) |
+                                      across << regions_across * region_of(first_y + rows - 1);
+        run.append_blocks<columns, rows>(place, all, regions);
     }
 
     void draw_triangle() {
@@ -379,7 +378,7 @@ struct Coverage {
         const bool rejects = run.draw->hierarchical && run.depth;
         const std::int32_t region_x = x0 / 16, region_y = y0 / 16;
         if (region_x == x1 / 16 && region_y == y1 / 16) {
-            if (rejects && run.hidden(region_x, region_y, x0, x1, y0, y1, false)) return;
+            if (rejects && run.hidden(region_x, region_y, x0, x1, y0, y1)) return;
             run_blocks(edges, first_x, last_x, first_y, last_y);
             return;
         }
@@ -404,7 +403,7 @@ struct Coverage {
                     for (std::uint32_t s = 0; s < samples; ++s) part.e[s][part.edges] = e[s][i];
                     ++part.edges;
                 }
-                if (outside || (rejects && run.hidden(x, y, left, right, top, bottom, false))) continue;
+                if (outside || (rejects && run.hidden(x, y, left, right, top, bottom))) continue;
                 part.bounded = bounded || part.edges < edges;
                 part.run_blocks(part.edges, left / 4, right / 4, top / 4, bottom / 4);
             }

@@ -26,13 +26,22 @@ inline constexpr std::int32_t region_size = 4 * region_blocks;
 inline constexpr std::int32_t regions_across = tile_blocks / region_blocks;
 inline constexpr std::int32_t key_lowest = -0x7fffffff - 1, key_highest = 0x7fffffff;
 
-/// The numbers of the quads in a set of four, and behind them whatever.
-alignas(16) constexpr std::int32_t quad_order[16][4] = {
-    {0, 0, 0, 0}, {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {2, 0, 0, 0}, {0, 2, 0, 0}, {1, 2, 0, 0}, {0, 1, 2, 0},
-    {3, 0, 0, 0}, {0, 3, 0, 0}, {1, 3, 0, 0}, {0, 1, 3, 0}, {2, 3, 0, 0}, {0, 2, 3, 0}, {1, 2, 3, 0}, {0, 1, 2, 3}};
-
 /// Where the blocks right of, below, and right below of another lie.
 constexpr std::uint32_t four_blocks[4] = {0, 16, 16 * tile_blocks, 16 * tile_blocks + 16};
+
+/// The places of the quads of some blocks across and down, from the first of them, block by block; then whatever.
+template <int columns, int rows>
+struct QuadPlaces {
+    alignas(64) std::int32_t at[16];
+    constexpr QuadPlaces() : at{} {
+        for (int block = 0; block < columns * rows; ++block)
+            for (int quad = 0; quad < 4; ++quad)
+                at[4 * block + quad] =
+                    static_cast<std::int32_t>(four_blocks[2 * (block / columns) + block % columns]) + 4 * quad;
+    }
+};
+template <int columns, int rows>
+constexpr QuadPlaces<columns, rows> quad_places;
 
 struct TileRun {
     const TileJob& job;
@@ -332,12 +341,9 @@ struct TileRun {
             written_blocks[region_y * region_blocks + y] &= static_cast<std::uint16_t>(~(15u << (4 * region_x)));
     }
 
-    /// Whether no sample of the record in pixels [x0, x1] x [y0, y1] of the tile, all in one region, passes the depth
-    /// test. Floating-point addition and multiplication keep order, so the formula of depth is largest and smallest in
-    /// the corners, bit for bit.
+    /// Whether something of a record in a region may be hidden: there is a bound that says anything.
     /// @param is_small  one of many triangles in the region: it is not measured for each of them
-    [[gnu::always_inline]] bool hidden(std::int32_t region_x, std::int32_t region_y, std::int32_t x0, std::int32_t x1,
-                                       std::int32_t y0, std::int32_t y1, bool is_small) {
+    [[gnu::always_inline]] bool may_hide(std::int32_t region_x, std::int32_t region_y, bool is_small) {
         const std::int32_t region = region_y * regions_across + region_x;
         const std::uint32_t doubts = ++region_doubts[region];
         if (!is_small || doubts % 32 == 0) {
@@ -349,8 +355,15 @@ struct TileRun {
         }
         // Nothing lies before the nearest depth that there is, or behind the farthest.
         const std::int32_t bound_key = region_bounds[region];
-        if (bound == Bound::above ? bound_key >= farthest_key : bound_key <= 0) return false;
-        return hidden(bound_key, x0, x1, y0, y1);
+        return bound == Bound::above ? bound_key < farthest_key : bound_key > 0;
+    }
+    /// Whether no sample of the record in pixels [x0, x1] x [y0, y1] of the tile, all in one region, passes the depth
+    /// test. Floating-point addition and multiplication keep order, so the formula of depth is largest and smallest in
+    /// the corners, bit for bit.
+    [[gnu::always_inline]] bool hidden(std::int32_t region_x, std::int32_t region_y, std::int32_t x0, std::int32_t x1,
+                                       std::int32_t y0, std::int32_t y1) {
+        return may_hide(region_x, region_y, false) &&
+               hidden(region_bounds[region_y * regions_across + region_x], x0, x1, y0, y1);
     }
     [[gnu::noinline]] bool hidden(std::int32_t bound_key, std::int32_t x0, std::int32_t x1, std::int32_t y0,
                                   std::int32_t y1) const {
@@ -406,7 +419,7 @@ struct TileRun {
         const PrimitiveData* const from = &current_primitive();
         const std::uint32_t first = stream.quads;
         repeat_pointer<4>(stream.primitives + first, from);
-        const std::uint32_t used = append_quads(stream, place, live);
+        const std::uint32_t used = append_quads<1, 1>(stream, place, live);
         if (covered) {
             std::uint32_t next = first;
             for (std::uint32_t quad = 0; quad < 4; ++quad) {
@@ -417,20 +430,18 @@ struct TileRun {
         }
         if (stream.quads >= stream_quads) flush_stream(stream_index, stream_quads);
     }
-    /// The same for one or two blocks across and down, with one sample; `live` may be zero for some.
+    /// The same for one or two blocks across and down, with one sample.
+    /// @param live     pixels, 16 bits for each block, which may be zero for some
     /// @param regions  one bit for each that they lie in
     template <int columns, int rows>
-    [[gnu::always_inline]] void append_blocks(std::uint32_t place, const std::uint32_t (&live)[columns * rows],
-                                              std::uint32_t regions) {
+    [[gnu::always_inline]] void append_blocks(std::uint32_t place, std::uint64_t live, std::uint32_t regions) {
         for (std::uint32_t fresh = regions & ~entered_regions; fresh != 0; fresh &= fresh - 1)
             enter_region(static_cast<std::uint32_t>(__builtin_ctz(fresh)));
         if (whole_count != 0) flush_whole();
         Stream& stream = memory.streams[0];
         const PrimitiveData* const from = &current_primitive();
         repeat_pointer<4 * columns * rows>(stream.primitives + stream.quads, from);
-        unrolled<columns * rows>([&](auto block) {
-            append_quads(stream, place + four_blocks[2 * (block.at / columns) + block.at % columns], live[block.at]);
-        });
+        append_quads<columns, rows>(stream, place, live);
         if (stream.quads >= stream_quads) flush_stream(0, stream_quads);
     }
     template <int count>
@@ -441,14 +452,13 @@ struct TileRun {
         for (int i = 0; i < count; i += 4) std::memcpy(to + i, &four, sizeof(four));
     }
     /// @return the quads that have a pixel, one bit for each
-    NACRE_LANES_INLINE static std::uint32_t append_quads(Stream& stream, std::uint32_t place, std::uint32_t live) {
-        // All four, one behind the other, and then only those with a pixel count.
-        const Int4 pixels = (static_cast<std::int32_t>(live) >> Int4{0, 4, 8, 12}) & 15;
-        const Int4 entries =
-            (pixels << static_cast<int>(Stream::live_shift)) + (static_cast<std::int32_t>(place) + Int4{0, 4, 8, 12});
-        const std::uint32_t any = (live | live >> 1 | live >> 2 | live >> 3) & 0x1111;
-        const std::uint32_t used = (any | any >> 3 | any >> 6 | any >> 9) & 15;
-        store4(stream.places + stream.quads, shuffled(entries, load4(quad_order[used])));
+    template <int columns, int rows>
+    NACRE_LANES_INLINE static std::uint32_t append_quads(Stream& stream, std::uint32_t place, std::uint64_t live) {
+        const Ints pixels = groups_of_four_bits(live);
+        const std::uint32_t used = mask_of(~equal(pixels, ints(0)));
+        store_packed(stream.places + stream.quads, used,
+                     shift_left<Stream::live_shift>(pixels) +
+                         (load(quad_places<columns, rows>.at) + ints(static_cast<std::int32_t>(place))));
         stream.quads += static_cast<std::uint32_t>(__builtin_popcount(used));
         return used;
     }
