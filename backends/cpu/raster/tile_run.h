@@ -495,11 +495,11 @@ struct TileRun {
     [[gnu::noinline]] void flush_whole() {
         FragmentBatch* const batches = memory.batches + stream_quads / max_quads;
         draw->fragment(draw->context, batches, whole_count);
-        for (std::uint32_t i = 0; i < whole_count; ++i)
-            write_words(batches[i], [&](auto&& each) {
-                each(memory.whole_places[i], 0,
-                     [](std::uint32_t* to, const std::uint32_t* from) { store(to, load(from)); });
-            });
+        for (std::uint32_t i = 0; i < whole_count; ++i) {
+            std::uint32_t* const pixels = colors_at(memory.whole_places[i]);
+            for_plain_words(batches[i],
+                            [&](const std::uint32_t* from, std::uint32_t to) { store(pixels + to, load(from)); });
+        }
         whole_count = 0;
     }
 
@@ -577,38 +577,39 @@ struct TileRun {
         store(batch.centroid_x, floats(batch.sample_x)), store(batch.centroid_y, floats(batch.sample_y));
     }
 
-    /// Calls `write` with what writes the results of a batch where nothing is blended: each(place, lane, copy) calls
-    /// copy(to, from) for each word of the pixels from `lane` on, which lie from `place` on.
-    template <typename Write>
-    NACRE_LANES_INLINE void write_words(const FragmentBatch& batch, const Write& write) {
+    /// Calls `copy(from, to)` for each word of a target that the results of a batch go to where nothing is blended: the
+    /// words of sixteen lanes, and how many words behind the first one of a pixel they lie.
+    template <typename Copy>
+    NACRE_LANES_INLINE void for_plain_words(const FragmentBatch& batch, const Copy& copy) {
         alignas(64) std::uint32_t packed[8][4][16];
         if (plain_from_batch != plain_count)
             for (std::uint32_t i = 0; i < draw->color_count; ++i)
                 if (const ColorPlan& plan = draw->colors[i]; !plan.as_it_is)
                     pack_colors(plan, targets.colors[plan.target], *job.srgb, batch, packed[i]);
-        const std::uint32_t from_batch = plain_from_batch, count = plain_count;
-        const std::size_t block_words = targets.color_planes * 16;
-        std::uint32_t* const colors = memory.colors;
-        const PlainWord* const words = plain_words;
         // What the fragment function has written as it is comes first.
-        write([&](std::uint32_t place, std::uint32_t lane, auto&& copy) {
-            std::uint32_t* const to = colors + (place >> 4) * block_words + (place & 15);
-            std::uint32_t i = 0;
-            for (; i < from_batch; ++i) copy(to + words[i].to, &batch.colors[0][0][0] + words[i].from + lane);
-            for (; i < count; ++i) copy(to + words[i].to, &packed[0][0][0] + words[i].from + lane);
-        });
+        std::uint32_t i = 0;
+        for (; i < plain_from_batch; ++i) copy(&batch.colors[0][0][0] + plain_words[i].from, plain_words[i].to);
+        for (; i < plain_count; ++i) copy(&packed[0][0][0] + plain_words[i].from, plain_words[i].to);
     }
     /// The frequent case of `resolve`: one sample, tested before, nothing blended.
-    void write_plain(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t quads) {
+    template <int quads>
+    void write_plain(const FragmentBatch& batch, const std::uint32_t* places) {
+        std::uint32_t* pixels[quads];
+        unrolled<quads>([&](auto quad) { pixels[quad.at] = colors_at(places[quad.at]); });
         const std::uint32_t live = batch.live;
-        write_words(batch, [&](auto&& each) {
-            for (std::uint32_t quad = 0; quad < quads; ++quad) {
-                // Quads of unfilled batches repeat others, without a live pixel.
-                const std::uint32_t pixels = live >> (4 * quad) & 15;
-                each(places[quad], 4 * quad,
-                     [&](std::uint32_t* to, const std::uint32_t* from) { store_some4(to, load4(from), pixels); });
-            }
+        for_plain_words(batch, [&](const std::uint32_t* from, std::uint32_t to) {
+            // Quads of unfilled batches repeat others, without a live pixel.
+            unrolled<quads>([&](auto quad) {
+                store_some4(pixels[quad.at] + to, load4(from + 4 * quad.at), live >> (4 * quad.at) & 15);
+            });
         });
+    }
+    void write_plain(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t quads) {
+        switch (quads) {
+            case 1: write_plain<1>(batch, places); break;
+            case 2: write_plain<2>(batch, places); break;
+            default: write_plain<4>(batch, places); break;
+        }
     }
     /// Lists the words that write_plain writes.
     void list_plain_words() {

@@ -34,6 +34,23 @@ void fetch_indices(const DrawCall& call, std::uint32_t first_element, std::uint3
 
 /// Turns the indices in `scratch.locals` into places of `scratch.indices`, which gets each different one once.
 void find_unique(ChunkScratch& scratch) {
+    std::uint32_t lowest = ~0u, highest = 0;
+    for (const std::uint32_t index : scratch.locals) lowest = std::min(lowest, index), highest = std::max(highest, index);
+    // Those that lie close together have a place for each that there could be.
+    if (const std::size_t range = std::size_t{highest} - lowest + 1; range <= scratch.locals.size()) {
+        constexpr std::uint32_t none = ~0u;
+        scratch.places.assign(range, none);
+        std::uint32_t* const places = scratch.places.data();
+        for (std::uint32_t& local : scratch.locals) {
+            std::uint32_t& place = places[local - lowest];
+            if (place == none) {
+                place = static_cast<std::uint32_t>(scratch.indices.size());
+                scratch.indices.push_back(local);
+            }
+            local = place;
+        }
+        return;
+    }
     const std::size_t size = std::bit_ceil(std::max<std::size_t>(64, 4 * scratch.locals.size()));
     if (scratch.cache.size() < size) scratch.cache.assign(size, {}), scratch.generation = 0;
     if (++scratch.generation == 0) {
