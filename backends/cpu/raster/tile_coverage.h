@@ -404,7 +404,9 @@ struct Coverage {
                     ++part.edges;
                 }
                 if (outside || (rejects && run.hidden(x, y, left, right, top, bottom))) continue;
-                part.bounded = bounded || part.edges < edges;
+                // Not where they are all of their blocks.
+                const bool cuts_blocks = ((left | top) & 3) != 0 || (right & bottom & 3) != 3;
+                part.bounded = cuts_blocks && (bounded || part.edges < edges);
                 part.run_blocks(part.edges, left / 4, right / 4, top / 4, bottom / 4);
             }
     }

@@ -76,12 +76,17 @@ struct TileRun {
     std::uint32_t next_slot = 0;
     // Blocks that wait as a whole, in a draw that lets them. What waits there and in the stream are different blocks.
     bool keeps_whole = false;
+    bool fills_later = false;  ///< See unfilled_regions.
     std::uint32_t whole_count = 0;
     std::uint32_t whole_primitives = 0;  ///< Primitives whose first block waited as a whole, since nothing waited.
     std::uint32_t appended_beside = 0;   ///< Blocks appended to the stream since the first whole one waits.
     // One bit for each region: colors that are in the tile's memory, those of all targets that the draw writes, and of
     // each.
     std::uint32_t entered_regions = 0, loaded_regions[8] = {};
+    // Blocks that are drawn as a whole need not be filled with what the targets are cleared to before: regions that have
+    // blocks of which that is not known yet, and those blocks. None where another draw begins.
+    std::uint32_t unfilled_regions = 0;
+    std::uint16_t unfilled_blocks[regions_across * regions_across] = {};
     bool front = true;
 
     // Hierarchical depth: for each region a depth that no other is above, or below. Draws that keep the nearer
@@ -166,10 +171,17 @@ struct TileRun {
     }
 
     /// The colors of a region, for all targets that the draw writes; it draws there for the first time.
-    [[gnu::noinline]] void enter_region(std::uint32_t region) {
+    /// @param later  its blocks may be filled when something is drawn to them
+    [[gnu::noinline]] void enter_region(std::uint32_t region, bool later) {
         entered_regions |= 1u << region;
         const std::int32_t x = static_cast<std::int32_t>(region % regions_across) * region_size;
         const std::int32_t y = static_cast<std::int32_t>(region / regions_across) * region_size;
+        if (later && fills_later && x + region_size <= width && y + region_size <= height) {
+            for (std::uint32_t i = 0; i < draw->color_count; ++i) loaded_regions[draw->colors[i].target] |= 1u << region;
+            unfilled_regions |= 1u << region;
+            unfilled_blocks[region] = 0xffff;
+            return;
+        }
         for (std::uint32_t i = 0; i < draw->color_count; ++i) {
             const std::uint32_t index = draw->colors[i].target;
             // Targets with doubles are written where they lie.
@@ -184,6 +196,28 @@ struct TileRun {
                     load_pixels(target.texel_bytes, texels_of(target, sample, x, y), target.row_stride, area);
             }
         }
+    }
+
+    /// @param block  of its region
+    void fill_block(std::uint32_t region, std::uint32_t block) {
+        unfilled_blocks[region] = static_cast<std::uint16_t>(unfilled_blocks[region] & ~(1u << block));
+        std::uint32_t* const pixels =
+            colors_at(block_place(static_cast<std::int32_t>(region % regions_across * region_blocks + block % region_blocks),
+                                  static_cast<std::int32_t>(region / regions_across * region_blocks + block / region_blocks)));
+        for (std::uint32_t i = 0; i < draw->color_count; ++i) {
+            const ColorTarget& target = targets.colors[draw->colors[i].target];
+            for (std::uint32_t word = 0; word < target.words; ++word)
+                store(pixels + color_offset(target, 0) + 16 * word, ints(static_cast<std::int32_t>(target.clear[word])));
+        }
+    }
+    /// Fills what is left of a region.
+    [[gnu::noinline]] void fill_region(std::uint32_t region) {
+        unfilled_regions &= ~(1u << region);
+        for (std::uint32_t rest = unfilled_blocks[region]; rest != 0; rest &= rest - 1)
+            fill_block(region, static_cast<std::uint32_t>(__builtin_ctz(rest)));
+    }
+    void fill_regions() {
+        while (unfilled_regions != 0) fill_region(static_cast<std::uint32_t>(__builtin_ctz(unfilled_regions)));
     }
 
     /// Writes regions of a target back, or fills them where nothing was drawn and they are to be cleared.
@@ -211,6 +245,7 @@ struct TileRun {
 
     void finish() {
         flush();
+        fill_regions();
         for (std::uint32_t i = 0; i < targets.color_count; ++i)
             if (targets.colors[i].data) store_colors(targets.colors[i], loaded_regions[i]);
         const bool depth_clears = clears && targets.depth_clears, stencil_clears = clears && targets.stencil_clears;
@@ -235,6 +270,7 @@ struct TileRun {
     void begin_draw(std::uint32_t index) {
         if (index == draw_index) return;
         flush();
+        fill_regions();
         draw_index = index;
         draw = job.draws[index];
         const DepthStencilPlan& plan = draw->depth_stencil;
@@ -252,6 +288,12 @@ struct TileRun {
         entered_regions = ~0u;
         for (std::uint32_t i = 0; i < draw->color_count; ++i) entered_regions &= loaded_regions[draw->colors[i].target];
         keeps_whole = draw->plain_results && job.lanes == 16;
+        fills_later = keeps_whole && clears;
+        for (std::uint32_t i = 0; i < draw->color_count; ++i) {
+            const std::uint32_t target = draw->colors[i].target;
+            // Some of its regions may be drawn to already.
+            fills_later = fills_later && targets.colors[target].clears && loaded_regions[target] == 0;
+        }
         if (draw->plain_results) list_plain_words();
         if (depth) note_bounds(plan);
         const auto larger = [](std::int32_t a, std::int32_t b) { return a > b ? a : b; };
@@ -412,8 +454,13 @@ struct TileRun {
     [[gnu::always_inline]] void append_block(std::uint32_t stream_index, std::uint32_t place, std::uint32_t live,
                                              const std::uint8_t* covered, const std::uint8_t* alive) {
         const std::uint32_t region = (place >> 10) * regions_across + (place >> 6 & 3);
-        if ((entered_regions >> region & 1) == 0) enter_region(region);
-        if (live == 0xffff && keeps_whole && !waits_in_stream(place)) return append_whole(place);
+        if ((entered_regions >> region & 1) == 0) enter_region(region, true);
+        const std::uint32_t block = (place >> 6 & 12) + (place >> 4 & 3);
+        if (live == 0xffff && keeps_whole && !waits_in_stream(place)) {
+            unfilled_blocks[region] = static_cast<std::uint16_t>(unfilled_blocks[region] & ~(1u << block));
+            return append_whole(place);
+        }
+        if ((unfilled_blocks[region] >> block & 1) != 0) fill_block(region, block);
         if (whole_count != 0 && (waits_as_whole(place) || ++appended_beside == most_primitives_beside)) flush_whole();
         Stream& stream = memory.streams[stream_index];
         const PrimitiveData* const from = &current_primitive();
@@ -435,8 +482,13 @@ struct TileRun {
     /// @param regions  one bit for each that they lie in
     template <int columns, int rows>
     [[gnu::always_inline]] void append_blocks(std::uint32_t place, std::uint64_t live, std::uint32_t regions) {
-        for (std::uint32_t fresh = regions & ~entered_regions; fresh != 0; fresh &= fresh - 1)
-            enter_region(static_cast<std::uint32_t>(__builtin_ctz(fresh)));
+        for (std::uint32_t fresh = regions & (~entered_regions | unfilled_regions); fresh != 0; fresh &= fresh - 1) {
+            const auto region = static_cast<std::uint32_t>(__builtin_ctz(fresh));
+            if ((unfilled_regions >> region & 1) != 0)
+                fill_region(region);
+            else
+                enter_region(region, false);
+        }
         if (whole_count != 0) flush_whole();
         Stream& stream = memory.streams[0];
         const PrimitiveData* const from = &current_primitive();
