@@ -61,19 +61,21 @@ struct Queue {
 void draw_tile(const TileJob& job, std::uint32_t tile, Workspace& workspace) {
     TileRun run(job, tile, workspace);
     Queue queue;
-    for (std::uint32_t i = 0; i < job.chunk_count; ++i) {
-        const ChunkView& chunk = job.chunks[i];
-        const std::uint32_t* bin = nullptr;
-        const std::uint32_t* bin_end = nullptr;
-        if (chunk.bin_offsets)
-            bin = chunk.bins + chunk.bin_offsets[tile], bin_end = chunk.bins + chunk.bin_offsets[tile + 1];
-        const std::uint32_t* large = chunk.large;
-        const std::uint32_t* const large_end = large + chunk.large_count;
-        while (bin != bin_end || large != large_end) {
-            const bool from_bin = large == large_end || (bin != bin_end && *bin < *large);
-            queue.push(run, chunk.records[from_bin ? *bin++ : *large++], chunk.vertices);
+    const std::uint64_t* const words = job.tile_chunks + std::size_t{tile} * job.chunk_words;
+    for (std::uint32_t word = 0; word < job.chunk_words; ++word)
+        for (std::uint64_t rest = words[word]; rest != 0; rest &= rest - 1) {
+            const ChunkView& chunk = job.chunks[64 * word + static_cast<std::uint32_t>(__builtin_ctzll(rest))];
+            const std::uint32_t* bin = nullptr;
+            const std::uint32_t* bin_end = nullptr;
+            if (chunk.bin_offsets)
+                bin = chunk.bins + chunk.bin_offsets[tile], bin_end = chunk.bins + chunk.bin_offsets[tile + 1];
+            const std::uint32_t* large = chunk.large;
+            const std::uint32_t* const large_end = large + chunk.large_count;
+            while (bin != bin_end || large != large_end) {
+                const bool from_bin = large == large_end || (bin != bin_end && *bin < *large);
+                queue.push(run, chunk.records[from_bin ? *bin++ : *large++], chunk.vertices);
+            }
         }
-    }
     queue.drain(run);
     run.finish();
 }
