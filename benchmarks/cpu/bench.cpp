@@ -117,9 +117,10 @@ Expected<void> Bench::measure(Case work) {
         if (cpu.side->lanes == 0) continue;
         if (options_.alone) {
             any = true;
-            fmt::print("{:<38} {:>2} lanes {:>9.2f} ms, median {:>9.2f} ms, processor time {:>9.2f} ms, median {:>9.2f} ms\n",
-                       work.name, cpu.side->lanes, std::ranges::min(cpu.times), measure::median(cpu.times),
-                       std::ranges::min(cpu.processor_times), measure::median(cpu.processor_times));
+            fmt::print(
+                "{:<38} {:>2} lanes {:>9.2f} ms, median {:>9.2f} ms, processor time {:>9.2f} ms, median {:>9.2f} ms\n",
+                work.name, cpu.side->lanes, std::ranges::min(cpu.times), measure::median(cpu.times),
+                std::ranges::min(cpu.processor_times), measure::median(cpu.processor_times));
             continue;
         }
         for (const Measured& reference : measured) {

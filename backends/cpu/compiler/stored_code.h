@@ -10,8 +10,8 @@
 #include "backends/cpu/program.h"
 
 /// @file
-/// What the disk cache keeps of a compiled shader: its code, and all that the rest of the backend knows of it. With it a
-/// shader that is known is neither legalized nor translated again.
+/// What the disk cache keeps of a compiled shader: its code, and all that the rest of the backend knows of it. With it
+/// a shader that is known is neither legalized nor translated again.
 
 namespace nacre::cpu {
 
@@ -30,9 +30,9 @@ struct StoredCode {
     std::vector<std::byte> object;  ///< Empty where that is too much.
 };
 
-// An entry of the cache. Of programs everything is kept but `run`, `name`, `code` and `in_double`, which the options say.
-// Entries are of this version of the compiler (the cache's key says so); whatever else `from_entry` may find in one, it
-// returns false and leaves no part of it that could do harm.
+// An entry of the cache. Of programs everything is kept but `run`, `name`, `code` and `in_double`, which the options
+// say. Entries are of this version of the compiler (the cache's key says so); whatever else `from_entry` may find in
+// one, it returns false and leaves no part of it that could do harm.
 
 std::vector<std::byte> to_entry(const ComputeFacts& facts, const StoredCode& code);
 std::vector<std::byte> to_entry(const VertexProgram& facts, const StoredCode& code);

@@ -191,8 +191,8 @@ struct Rasterizer::State {
             if (double_memory[thread].reserve(bytes, 0)) std::memset(double_memory[thread].data(), 0, bytes);
             workspace(thread).doubles = reinterpret_cast<FragmentDoubles*>(double_memory[thread].data());
         }
-        const TileJob job{&targets,         views.data(),       plans.data(), lanes, &srgb_tables(),
-                          uncleared.data(), tile_chunks.data(), chunk_words};
+        const TileJob job{&targets,       views.data(),     plans.data(),       lanes,
+                          &srgb_tables(), uncleared.data(), tile_chunks.data(), chunk_words};
         run(static_cast<std::uint32_t>(busy_tiles.size()), [&](std::uint32_t index, std::uint32_t thread) {
             kernels.draw_tile(job, busy_tiles[index], workspace(thread));
         });

@@ -305,8 +305,8 @@ template <int number>
 struct Index {
     static constexpr int at = number;
 };
-/// Calls `work` with Index<0>, Index<1>, ... one after the other: a loop that is unrolled for certain, so that arrays over
-/// its index stay in registers.
+/// Calls `work` with Index<0>, Index<1>, ... one after the other: a loop that is unrolled for certain, so that arrays
+/// over its index stay in registers.
 template <int count, typename Work>
 NACRE_LANES_INLINE void unrolled(const Work& work) {
     if constexpr (count > 1) unrolled<count - 1>(work);
@@ -377,8 +377,8 @@ NACRE_LANES_INLINE void transpose(Row& a, Row& b, Row& c, Row& d) {
 NACRE_LANES_INLINE Ints groups_of_four_bits(std::uint64_t bits) {
     Ints result;
 #if defined(__AVX512F__)
-    const __m512i words = _mm512_mask_set1_epi32(_mm512_set1_epi32(static_cast<int>(bits)), 0xff00,
-                                                 static_cast<int>(bits >> 32));
+    const __m512i words =
+        _mm512_mask_set1_epi32(_mm512_set1_epi32(static_cast<int>(bits)), 0xff00, static_cast<int>(bits >> 32));
     const __m512i shifts = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28);
     result.part[0] = (IntRegister)_mm512_and_epi32(_mm512_srlv_epi32(words, shifts), _mm512_set1_epi32(15));
 #else
@@ -425,7 +425,8 @@ NACRE_LANES_INLINE void load_rows(const Address& address_of, Ints (&words)[4]) {
     unrolled<4>([&](auto row) {
         const auto part = [&](int group) { return (__m128i)load4(address_of(4 * group + row.at)); };
         rows[row.at] = _mm512_inserti32x4(
-            _mm512_inserti32x4(_mm512_inserti32x4(_mm512_castsi128_si512(part(0)), part(1), 1), part(2), 2), part(3), 3);
+            _mm512_inserti32x4(_mm512_inserti32x4(_mm512_castsi128_si512(part(0)), part(1), 1), part(2), 2), part(3),
+            3);
     });
     const __m512i low01 = _mm512_unpacklo_epi32(rows[0], rows[1]), high01 = _mm512_unpackhi_epi32(rows[0], rows[1]);
     const __m512i low23 = _mm512_unpacklo_epi32(rows[2], rows[3]), high23 = _mm512_unpackhi_epi32(rows[2], rows[3]);
@@ -464,7 +465,8 @@ NACRE_LANES_INLINE void store_rows(const Ints (&words)[4], std::uint32_t count, 
         Int4 rows[4];
         for (int i = 0; i < 4; ++i) rows[i] = load4(lanes[i] + lane);
         transpose(rows[0], rows[1], rows[2], rows[3]);
-        for (std::uint32_t i = 0; i < 4 && lane + i < count; ++i) store4(address_of(static_cast<int>(lane + i)), rows[i]);
+        for (std::uint32_t i = 0; i < 4 && lane + i < count; ++i)
+            store4(address_of(static_cast<int>(lane + i)), rows[i]);
     }
 #endif
 }

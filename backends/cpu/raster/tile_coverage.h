@@ -275,8 +275,7 @@ struct Coverage {
         const std::int32_t region_x = x0 / 16, region_y = y0 / 16;
         // What lies in one region is hard to guess, whether anything may be hidden is not: it is asked first.
         if (draw.hierarchical && run.depth && run.may_hide(region_x, region_y, true) && region_x == x1 / 16 &&
-            region_y == y1 / 16 &&
-            run.hidden(run.region_bounds[region_y * regions_across + region_x], x0, x1, y0, y1))
+            region_y == y1 / 16 && run.hidden(run.region_bounds[region_y * regions_across + region_x], x0, x1, y0, y1))
             return;
         bounded = (from.cut >> lane & 1) != 0;
         const std::int32_t left = x0 / 4, right = x1 / 4, top = y0 / 4, bottom = y1 / 4;
@@ -348,9 +347,8 @@ struct Coverage {
             default: test([&](Ints key, Ints at) { return compare(draw.depth_stencil.compare, key, at); }); break;
         }
         std::uint64_t all = 0;
-        unrolled<count>([&](auto block) {
-            all |= static_cast<std::uint64_t>(mask_of(passes[block.at])) << (16 * block.at);
-        });
+        unrolled<count>(
+            [&](auto block) { all |= static_cast<std::uint64_t>(mask_of(passes[block.at])) << (16 * block.at); });
         if (all == 0) return;
         if (draw.depth_stencil.depth_write) {
             unrolled<count>([&](auto block) {
@@ -367,8 +365,8 @@ struct Coverage {
         if (!draw.shades) return;
         const auto region_of = [](std::int32_t block) { return block / region_blocks; };
         const std::uint32_t across = 1u << region_of(first_x) | 1u << region_of(first_x + columns - 1);
-        const std::uint32_t regions = across << regions_across * region_of(first_y) |
-                                      across << regions_across * region_of(first_y + rows - 1);
+        const std::uint32_t regions =
+            across << regions_across * region_of(first_y) | across << regions_across * region_of(first_y + rows - 1);
         run.append_blocks<columns, rows>(place, all, regions);
     }
 

@@ -84,8 +84,8 @@ struct TileRun {
     // One bit for each region: colors that are in the tile's memory, those of all targets that the draw writes, and of
     // each.
     std::uint32_t entered_regions = 0, loaded_regions[8] = {};
-    // Blocks that are drawn as a whole need not be filled with what the targets are cleared to before: regions that have
-    // blocks of which that is not known yet, and those blocks. None where another draw begins.
+    // Blocks that are drawn as a whole need not be filled with what the targets are cleared to before: regions that
+    // have blocks of which that is not known yet, and those blocks. None where another draw begins.
     std::uint32_t unfilled_regions = 0;
     std::uint16_t unfilled_blocks[regions_across * regions_across] = {};
     bool front = true;
@@ -178,7 +178,8 @@ struct TileRun {
         const std::int32_t x = static_cast<std::int32_t>(region % regions_across) * region_size;
         const std::int32_t y = static_cast<std::int32_t>(region / regions_across) * region_size;
         if (later && fills_later && x + region_size <= width && y + region_size <= height) {
-            for (std::uint32_t i = 0; i < draw->color_count; ++i) loaded_regions[draw->colors[i].target] |= 1u << region;
+            for (std::uint32_t i = 0; i < draw->color_count; ++i)
+                loaded_regions[draw->colors[i].target] |= 1u << region;
             unfilled_regions |= 1u << region;
             unfilled_blocks[region] = 0xffff;
             return;
@@ -202,13 +203,14 @@ struct TileRun {
     /// @param block  of its region
     void fill_block(std::uint32_t region, std::uint32_t block) {
         unfilled_blocks[region] = static_cast<std::uint16_t>(unfilled_blocks[region] & ~(1u << block));
-        std::uint32_t* const pixels =
-            colors_at(block_place(static_cast<std::int32_t>(region % regions_across * region_blocks + block % region_blocks),
-                                  static_cast<std::int32_t>(region / regions_across * region_blocks + block / region_blocks)));
+        std::uint32_t* const pixels = colors_at(
+            block_place(static_cast<std::int32_t>(region % regions_across * region_blocks + block % region_blocks),
+                        static_cast<std::int32_t>(region / regions_across * region_blocks + block / region_blocks)));
         for (std::uint32_t i = 0; i < draw->color_count; ++i) {
             const ColorTarget& target = targets.colors[draw->colors[i].target];
             for (std::uint32_t word = 0; word < target.words; ++word)
-                store(pixels + color_offset(target, 0) + 16 * word, ints(static_cast<std::int32_t>(target.clear[word])));
+                store(pixels + color_offset(target, 0) + 16 * word,
+                      ints(static_cast<std::int32_t>(target.clear[word])));
         }
     }
     /// Fills what is left of a region.

@@ -157,9 +157,8 @@ inline void set_up_triangles(TriangleSetup& work) {
     unrolled<2>([&](auto half) {
         // Differences of coordinates have 24 bits, so that doubles hold the products.
         const Doubles fixed_x = doubles_of<half.at>(a.x), fixed_y = doubles_of<half.at>(a.y);
-        const Doubles fixed_area =
-            (doubles_of<half.at>(b.x) - fixed_x) * (doubles_of<half.at>(c.y) - fixed_y) -
-            (doubles_of<half.at>(c.x) - fixed_x) * (doubles_of<half.at>(b.y) - fixed_y);
+        const Doubles fixed_area = (doubles_of<half.at>(b.x) - fixed_x) * (doubles_of<half.at>(c.y) - fixed_y) -
+                                   (doubles_of<half.at>(c.x) - fixed_x) * (doubles_of<half.at>(b.y) - fixed_y);
         clockwise |= mask_of_eight(fixed_area > 0.0) << 8 * half.at;
         flat |= mask_of_eight(fixed_area == 0.0) << 8 * half.at;
     });
@@ -188,7 +187,8 @@ inline void set_up_triangles(TriangleSetup& work) {
         const Doubles x2 = doubles_of<half.at>(c.window_x) - x0, y2 = doubles_of<half.at>(c.window_y) - y0;
         const Doubles z1 = doubles_of<half.at>(b.window_z) - z0, z2 = doubles_of<half.at>(c.window_z) - z0;
         const Doubles area = x1 * y2 - x2 * y1;
-        thin |= (mask_of_eight(magnitude(area) < thin_area) | (mask_of_eight(area > 0.0) ^ (clockwise >> 8 * half.at & 0xff)))
+        thin |= (mask_of_eight(magnitude(area) < thin_area) |
+                 (mask_of_eight(area > 0.0) ^ (clockwise >> 8 * half.at & 0xff)))
                 << 8 * half.at;
         const Doubles scale = 1.0 / area;
         const Doubles dx = z1 * (y2 * scale) + z2 * (-y1 * scale), dy = z1 * (-x2 * scale) + z2 * (x1 * scale);

@@ -17,21 +17,25 @@
 namespace nacre::cpu {
 namespace {
 
-bool same(const NarrowedOperation& a, const NarrowedOperation& b) { return a.line == b.line && a.operation == b.operation; }
+bool same(const NarrowedOperation& a, const NarrowedOperation& b) {
+    return a.line == b.line && a.operation == b.operation;
+}
 bool same(const VertexOutput& a, const VertexOutput& b) {
     return a.location == b.location && a.component == b.component && a.slot == b.slot;
 }
 bool same(const FragmentInput& a, const FragmentInput& b) {
     return a.location == b.location && a.component == b.component && a.interpolation == b.interpolation;
 }
-bool same(const FragmentOutput& a, const FragmentOutput& b) { return a.output == b.output && a.components == b.components; }
+bool same(const FragmentOutput& a, const FragmentOutput& b) {
+    return a.output == b.output && a.components == b.components;
+}
 template <typename Element>
 bool same(const std::vector<Element>& a, const std::vector<Element>& b) {
     return std::ranges::equal(a, b, [](const Element& one, const Element& other) { return same(one, other); });
 }
 bool same(const ComputeFacts& a, const ComputeFacts& b) {
-    return a.workgroup_size == b.workgroup_size && a.workgroup_bytes == b.workgroup_bytes && a.subgroups == b.subgroups &&
-           a.has_barriers == b.has_barriers && same(a.narrowed, b.narrowed);
+    return a.workgroup_size == b.workgroup_size && a.workgroup_bytes == b.workgroup_bytes &&
+           a.subgroups == b.subgroups && a.has_barriers == b.has_barriers && same(a.narrowed, b.narrowed);
 }
 bool same(const VertexProgram& a, const VertexProgram& b) {
     return a.output_slots == b.output_slots && same(a.outputs, b.outputs) &&
@@ -52,8 +56,13 @@ const std::vector<NarrowedOperation> narrowed{{"a.comp:3", "packing"}, {"", "bit
 std::vector<ComputeFacts> compute_facts() { return {{}, {{2, 3, 4}, 1ull << 40, 5, true, narrowed}}; }
 std::vector<VertexProgram> vertex_facts() {
     std::vector<VertexProgram> all(4);
-    all[1] = {.output_slots = 17, .outputs = {{1, 2, 13}, {4, 0, 14}}, .clip_distances = 3, .cull_distances = 2,
-              .narrowed = narrowed, .name = {}, .code = {}};
+    all[1] = {.output_slots = 17,
+              .outputs = {{1, 2, 13}, {4, 0, 14}},
+              .clip_distances = 3,
+              .cull_distances = 2,
+              .narrowed = narrowed,
+              .name = {},
+              .code = {}};
     all[2].writes_point_size = true;
     all[3].has_side_effects = true;
     return all;
@@ -63,8 +72,8 @@ std::vector<FragmentProgram> fragment_facts() {
     all[1].inputs = {{1, 2, Interpolation::flat}, {3, 0, Interpolation::linear}};
     all[1].outputs = {{2, 3}};
     all[1].narrowed = narrowed;
-    bool FragmentProgram::* const flags[] = {&FragmentProgram::early_tests,     &FragmentProgram::discards,
-                                             &FragmentProgram::writes_depth,    &FragmentProgram::writes_sample_mask,
+    bool FragmentProgram::* const flags[] = {&FragmentProgram::early_tests,      &FragmentProgram::discards,
+                                             &FragmentProgram::writes_depth,     &FragmentProgram::writes_sample_mask,
                                              &FragmentProgram::has_side_effects, &FragmentProgram::runs_per_sample,
                                              &FragmentProgram::uses_centroid};
     for (std::size_t i = 0; i < std::size(flags); ++i) all[2 + i].*flags[i] = true;
@@ -118,8 +127,10 @@ class CompiledBefore : public testing::Test {
   protected:
     CompiledBefore() { setenv("NACRE_CACHE_DIR", folder_.path().c_str(), 1); }
     ~CompiledBefore() override {
-        if (previous_.empty()) unsetenv("NACRE_CACHE_DIR");
-        else setenv("NACRE_CACHE_DIR", previous_.c_str(), 1);
+        if (previous_.empty())
+            unsetenv("NACRE_CACHE_DIR");
+        else
+            setenv("NACRE_CACHE_DIR", previous_.c_str(), 1);
     }
 
     static std::vector<std::uint32_t> spirv(const std::string& path, const std::string& text) {
@@ -176,7 +187,8 @@ TEST_F(CompiledBefore, ComputeShadersAreNotTranslatedAgain) {
     ASSERT_TRUE(found) << found.error().message();
     EXPECT_THAT(found->workgroup_size, testing::ElementsAre(32, 1, 1));
     // Without the cache, and where a trace is wanted.
-    const auto anew = compiler({.lanes = 4, .use_disk_cache = false})->compile_compute({.spirv = narrow, .name = "narrow"});
+    const auto anew =
+        compiler({.lanes = 4, .use_disk_cache = false})->compile_compute({.spirv = narrow, .name = "narrow"});
     ASSERT_TRUE(anew);
     EXPECT_THAT(anew->workgroup_size, testing::ElementsAre(8, 1, 1));
     TraceTable table;
@@ -186,7 +198,8 @@ TEST_F(CompiledBefore, ComputeShadersAreNotTranslatedAgain) {
 }
 
 TEST_F(CompiledBefore, ShadersOfDrawsAreNotTranslatedAgain) {
-    const auto vertex = spirv("a.vert", "layout(location = 0) out vec2 a;\nvoid main() { a = vec2(1); gl_Position = vec4(0); }\n");
+    const auto vertex =
+        spirv("a.vert", "layout(location = 0) out vec2 a;\nvoid main() { a = vec2(1); gl_Position = vec4(0); }\n");
     const auto other_vertex = spirv("b.vert", "void main() { gl_PointSize = 2.0; gl_Position = vec4(0); }\n");
     const auto fragment = spirv("a.frag", "layout(location = 1) out vec3 a;\nvoid main() { a = gl_FragCoord.xyz; }\n");
     const auto other_fragment = spirv("b.frag", "void main() { discard; }\n");
@@ -209,8 +222,10 @@ TEST_F(CompiledBefore, ShadersOfDrawsAreNotTranslatedAgain) {
         ASSERT_TRUE(found);
         EXPECT_TRUE(same(*found, *second));
     };
-    check([&](const auto& words) { return compiler()->compile_vertex({.spirv = words, .name = "a"}, {}); }, vertex, other_vertex);
-    check([&](const auto& words) { return compiler()->compile_fragment({.spirv = words, .name = "a"}); }, fragment, other_fragment);
+    check([&](const auto& words) { return compiler()->compile_vertex({.spirv = words, .name = "a"}, {}); }, vertex,
+          other_vertex);
+    check([&](const auto& words) { return compiler()->compile_fragment({.spirv = words, .name = "a"}); }, fragment,
+          other_fragment);
 }
 
 TEST_F(CompiledBefore, WhateverCodeDependsOnIsPartOfTheKey) {
@@ -232,7 +247,8 @@ TEST_F(CompiledBefore, WhateverCodeDependsOnIsPartOfTheKey) {
     expect_new(options, {.spirv = words, .name = "a", .slots = slots[0]});
     expect_new(options, {.spirv = words, .name = "a", .slots = slots[1]});
     for (const rhi::SpecializationConstant& constant : constants)
-        expect_new(options, {.spirv = words, .name = "a", .specialization = std::span(&constant, 1), .slots = slots[0]});
+        expect_new(options,
+                   {.spirv = words, .name = "a", .specialization = std::span(&constant, 1), .slots = slots[0]});
     expect_new({.lanes = 8}, {.spirv = words, .name = "a", .slots = slots[0]});
     expect_new({.lanes = 4, .mode = ExecutionMode::consistent}, {.spirv = words, .name = "a", .slots = slots[0]});
     // Not on what the shader is called.
@@ -242,11 +258,12 @@ TEST_F(CompiledBefore, WhateverCodeDependsOnIsPartOfTheKey) {
 
 TEST_F(CompiledBefore, CodeWithTooMuchStackIsRefusedAgain) {
     // A copy of an array holds all of it in registers, which are on the stack: 3.4 MiB of doubles in 16 lanes.
-    const auto words = spirv("large.comp",
-                             "layout(local_size_x = 16) in;\nlayout(set = 0, binding = 0) buffer Data { float data[]; };\n"
-                             "void main() {\n    const uint at = gl_LocalInvocationIndex;\n    float a[28000], b[28000];\n"
-                             "    for (uint i = 0u; i < a.length(); ++i) a[(i + at) % a.length()] = 1.0 / float(i + 3u);\n"
-                             "    b = a; a[at] = 2.0;\n    data[at] = b[2u * at] + a[at];\n}\n");
+    const auto words =
+        spirv("large.comp",
+              "layout(local_size_x = 16) in;\nlayout(set = 0, binding = 0) buffer Data { float data[]; };\n"
+              "void main() {\n    const uint at = gl_LocalInvocationIndex;\n    float a[28000], b[28000];\n"
+              "    for (uint i = 0u; i < a.length(); ++i) a[(i + at) % a.length()] = 1.0 / float(i + 3u);\n"
+              "    b = a; a[at] = 2.0;\n    data[at] = b[2u * at] + a[at];\n}\n");
     const BindingSlots slots[] = {{}};
     const ShaderSource source{.spirv = words, .name = "large", .slots = slots};
     const CompilerOptions doubles{.lanes = 16, .mode = ExecutionMode::double_precision};

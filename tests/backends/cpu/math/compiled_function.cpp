@@ -122,8 +122,7 @@ std::string Variant::name() const {
     return std::to_string(lanes) + " lanes, " + (processor.empty() ? "host" : processor) +
            (options.contract ? ", contract" : "") + (options.half_instructions ? ", half instructions" : "") +
            (options.exponent_instructions ? ", exponent instructions" : "") +
-           (options.conversion_instructions ? ", conversion instructions" : "") +
-           (optimized ? ", optimized" : "");
+           (options.conversion_instructions ? ", conversion instructions" : "") + (optimized ? ", optimized" : "");
 }
 
 std::vector<Variant> measured_variants() {

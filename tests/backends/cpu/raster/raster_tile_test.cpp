@@ -274,9 +274,9 @@ TEST(Clears, FillWhatSmallTrianglesLeaveOfTheBlocksOfLargeOnes) {
                             const bool in_small = covers(small[0], small[1], small[2], place);
                             const bool in_large = covers(large[0], large[1], large[2], place);
                             of_small += in_small, of_large += in_large;
-                            const std::uint32_t expected = !in_small && !in_large                       ? none
+                            const std::uint32_t expected = !in_small && !in_large                     ? none
                                                            : !draws_twice && in_small == !small_first ? 2
-                                                                                                        : 1;
+                                                                                                      : 1;
                             ASSERT_EQ(color.at<std::uint32_t>(x, y), expected)
                                 << lanes << instruction_set << small_first << draws_twice << ": " << x << ", " << y;
                         }
