@@ -63,7 +63,8 @@ constexpr StorageFormat formats[] = {
     {StorageValue::path_transmittance, "path transmittance", color_bits, StorageCodec::color},
     {StorageValue::path_uncovered, "path uncovered", 6, StorageCodec::unit},
     {StorageValue::path_spread, "path spread", 6, StorageCodec::unit},
-    {StorageValue::path_under_interface, "path under interface", 6, StorageCodec::unit},
+    {StorageValue::path_ior, "path ior", 6, StorageCodec::unit, 1.0, 2.6},
+    {StorageValue::path_slant, "path slant", 4, StorageCodec::unit},
 };
 
 // Fields of features, in the order of the stream.
@@ -110,7 +111,8 @@ void for_each_closure_field(std::uint32_t index, std::uint32_t closure_count, st
         field(StorageValue::path_transmittance);
         field(StorageValue::path_uncovered);
         field(StorageValue::path_spread);
-        field(StorageValue::path_under_interface);
+        field(StorageValue::path_ior);
+        field(StorageValue::path_slant);
     } else if (closure_count > 1) {
         field(StorageValue::grey_weight);
     }
@@ -407,8 +409,11 @@ StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, co
                                      (closure->path.spread.r + closure->path.spread.g + closure->path.spread.b) / 3.0,
                                      next_dither());
                 break;
-            case StorageValue::path_under_interface:
-                code = encode_number(format, field.bits, closure->path.under_interface, next_dither());
+            case StorageValue::path_ior:
+                code = encode_number(format, field.bits, closure->path.ior, next_dither());
+                break;
+            case StorageValue::path_slant:
+                code = encode_number(format, field.bits, closure->path.slant, next_dither());
                 break;
             default: {
                 Library::Slab slab = closure->slab;
@@ -493,8 +498,10 @@ Expected<UnpackedMaterial> unpack_pixel(const StoredPixel& pixel) {
                 result.path.uncovered = glm::dvec3(decode_number(format, format.bits, code));
             } else if (value == StorageValue::path_spread) {
                 result.path.spread = glm::dvec3(decode_number(format, format.bits, code));
-            } else if (value == StorageValue::path_under_interface) {
-                result.path.under_interface = decode_number(format, format.bits, code);
+            } else if (value == StorageValue::path_ior) {
+                result.path.ior = decode_number(format, format.bits, code);
+            } else if (value == StorageValue::path_slant) {
+                result.path.slant = decode_number(format, format.bits, code);
             } else if (value == StorageValue::medium_transmittance) {
                 const glm::dvec3 transmittance = library.unpack_color(code);
                 for (int channel = 0; channel < 3; ++channel) {

@@ -195,8 +195,10 @@ class Writer {
             case StorageValue::path_spread:
                 return encode(format, field.bits, fmt::format("dot(state.paths[{}].spread, vec3(1.0 / 3.0))", closure),
                               next_dither());
-            case StorageValue::path_under_interface:
-                return encode(format, field.bits, fmt::format("state.paths[{}].under_interface", closure), next_dither());
+            case StorageValue::path_ior:
+                return encode(format, field.bits, fmt::format("state.paths[{}].ior", closure), next_dither());
+            case StorageValue::path_slant:
+                return encode(format, field.bits, fmt::format("state.paths[{}].slant", closure), next_dither());
             default: break;
         }
         const std::string value = fmt::format("state.slabs[{}].{}", closure, member_of(field.value));
@@ -336,7 +338,8 @@ StoredClosure read_stored_closure(inout StoredHeader header, uint index, float t
         closure.path.transmittance = {};
         closure.path.uncovered = vec3({});
         closure.path.spread = vec3({});
-        closure.path.under_interface = {};
+        closure.path.ior = {};
+        closure.path.slant = {};
 #endif
     }} else if (header.closure_count > 1u) {{
         closure.path.weight = vec3({});
@@ -348,8 +351,8 @@ StoredClosure read_stored_closure(inout StoredHeader header, uint index, float t
 #endif
 )",
           read(StorageValue::medium_transmittance), read(StorageValue::weight), read(StorageValue::path_transmittance),
-          read(StorageValue::path_uncovered), read(StorageValue::path_spread), read(StorageValue::path_under_interface),
-          read(StorageValue::grey_weight));
+          read(StorageValue::path_uncovered), read(StorageValue::path_spread), read(StorageValue::path_ior),
+          read(StorageValue::path_slant), read(StorageValue::grey_weight));
     return text;
 }
 

@@ -43,8 +43,9 @@
 //     vec3 internal_transmittance(Slab slab)                          of diffuse light from the medium's side
 //     vec3 internal_reflectance(Slab slab)                            the rest of that
 //
-// With NACRE_CLOSURE_COVERED (materials/closures/operators.glsl defines it) closures may be seen through layers:
-//     Closure cover_closure(Closure closure, vec3 spread, float under_interface)
+// With NACRE_CLOSURE_COVERED (materials/closures/operators.glsl defines it) closures may be seen through layers. They
+// are prepared for the view as it goes on inside; the lights are those outside, as ever:
+//     Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior, float view_cosine)
 //
 // Who includes this provides the tables (materials/closures/tables.glsl, medium.glsl) and, where a slab may have
 // slab_specular_lut, vec3 specular_lut(uint index, vec2 at): the tint by the cosines of view and light to the normal.
@@ -149,7 +150,13 @@ struct Closure {
     uint specular_lut;
 #endif
 #ifdef NACRE_CLOSURE_COVERED
-    float under_interface;  // share of the diffuse light that comes through a layer's interface; cover_closure
+    float ior;              // of what lies above; `view` and the lobes are inside it
+    float view_cosine;      // outside
+    SpecularLobe again;     // what the layers above have thrown back to the lobe, once or more often
+    vec3 again_view;        // what that lobe is seen from
+    float diffuse_scale;    // one over the share of the diffuse light that leaves what lies above
+    float lambert_scale;    // the same for the light of media
+    float again_probability;
 #endif
     float gloss;            // of the diffuse model
     ChanView chan;          // over its own albedo, where Chan's is the model
@@ -279,6 +286,43 @@ vec3 internal_reflectance(Slab slab) {
 }
 
 #ifdef NACRE_SLAB_MEDIUM
+// By how much more than Schlick's formula Fresnel's equations let through, where both count: for a dielectric's
+// reflectance at normal incidence from 0.005, fading in, to 0.3.
+float dielectric_excess(float f0, float cosine) {
+    float dielectric = min(f0, 0.3);
+    float exact =
+        dielectric_transmittance(cosine, refracted_cosine(cosine, dielectric), reflectance_to_ior(dielectric));
+    float share = saturated((f0 - 0.005) * (1.0 / 0.015)) * saturated((0.3 - f0) * 10.0);
+    return mix(1.0, exact / ((1.0 - dielectric) * schlick_rest(cosine, 1.0 - cosine)), share);
+}
+
+// A lobe of a slab with a medium, whose interface is a dielectric's, as bright as Fresnel's equations say of the facets
+// that reflect most. The curve within the lobe stays Schlick's.
+SpecularLobe dielectric_lobe(SpecularLobe lobe, Slab slab, float view_cosine) {
+    uint others = 0u;
+#ifdef NACRE_SLAB_F90
+    others |= slab_f90;
+#endif
+#ifdef NACRE_SLAB_F82
+    others |= slab_f82;
+#endif
+#ifdef NACRE_SLAB_THIN_FILM
+    others |= slab_thin_film;
+#endif
+    SpecularLobe result = lobe;
+    if ((slab.features & others) == 0u) {
+        float cosine = ggx_typical_cosine(min(view_cosine, 1.0), sqrt(lobe.area));
+        vec3 excess = vec3(dielectric_excess(slab.f0.x, cosine), dielectric_excess(slab.f0.y, cosine),
+                           dielectric_excess(slab.f0.z, cosine));
+        // At least half of the light stays in rough lobes, whose facets are not all seen from one angle.
+        vec3 albedo = max(lobe.albedo + lobe.passed * (vec3(1.0) - excess), 0.5 * lobe.albedo);
+        result = scaled_lobe(lobe, albedo / max(lobe.albedo, vec3(1e-30)));
+        result.albedo = albedo;
+        result.passed = min(lobe.passed * excess, lobe.passed + 0.5 * lobe.albedo);
+    }
+    return result;
+}
+
 // What becomes of light inside the slab, for each channel.
 struct MediumScattering {
     vec3 reflected;  // back to the interface
@@ -342,6 +386,10 @@ Closure with_probabilities(Closure closure) {
     result.transmission_probability = (closure.features & slab_medium) != 0u ? largest(closure.transmission) : 0.0;
     sum += result.transmission_probability;
 #endif
+#ifdef NACRE_CLOSURE_COVERED
+    result.again_probability = closure.ior > 1.0 ? largest(closure.again.albedo) : 0.0;
+    sum += result.again_probability;
+#endif
     // One over less would be infinite.
     float scale = sum > 1e-30 ? 1.0 / sum : 0.0;
     result.specular_probability *= scale;
@@ -354,6 +402,9 @@ Closure with_probabilities(Closure closure) {
 #endif
 #ifdef NACRE_SLAB_MEDIUM
     result.transmission_probability *= scale;
+#endif
+#ifdef NACRE_CLOSURE_COVERED
+    result.again_probability *= scale;
 #endif
     return result;
 }
@@ -374,6 +425,9 @@ Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprin
     }
 #endif
     closure.specular = make_specular_lobe(fresnel, closure.view, slab.roughness, anisotropy);
+#ifdef NACRE_SLAB_MEDIUM
+    if ((slab.features & slab_medium) != 0u) closure.specular = dielectric_lobe(closure.specular, slab, closure.view.z);
+#endif
     vec3 passed = closure.specular.passed;
 #ifdef NACRE_SLAB_GLINTS
     closure.glint_density = slab.glint_density;
@@ -384,6 +438,9 @@ Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprin
 #ifdef NACRE_SLAB_SECOND_LOBE
     if ((slab.features & slab_second_lobe) != 0u) {
         closure.second = make_specular_lobe(fresnel, closure.view, slab.second_roughness, anisotropy);
+#ifdef NACRE_SLAB_MEDIUM
+        if ((slab.features & slab_medium) != 0u) closure.second = dielectric_lobe(closure.second, slab, closure.view.z);
+#endif
         closure.specular = scaled_lobe(closure.specular, vec3(1.0 - slab.second_weight));
         closure.second = scaled_lobe(closure.second, vec3(slab.second_weight));
         passed = mix(closure.specular.passed, closure.second.passed, slab.second_weight);
@@ -446,7 +503,12 @@ Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprin
     }
 #endif
 #ifdef NACRE_CLOSURE_COVERED
-    closure.under_interface = 0.0;
+    closure.ior = 1.0;
+    closure.view_cosine = closure.view.z;
+    closure.again = scaled_lobe(closure.specular, vec3(0.0));
+    closure.again_view = closure.view;
+    closure.diffuse_scale = 1.0;
+    closure.lambert_scale = 1.0;
 #endif
     return with_probabilities(closure);
 }
@@ -456,10 +518,103 @@ Closure prepare_closure(Slab slab, vec3 view, float footprint) {
 }
 
 #ifdef NACRE_CLOSURE_COVERED
-// A closure that is seen through layers. spread: share of what its specular lobes send that does not come along them,
-// but as diffuse light does, having been scattered or thrown back on its way. under_interface: share of its light that
-// comes through an interface, which lets little in along the surface.
-Closure cover_closure(Closure closure, vec3 spread, float under_interface) {
+// Of diffuse light inside a medium of index `ior`, what its surface lets out (d'Eon and Irving 2011, "A
+// quantized-diffusion model for rendering translucent materials": a fit to Fresnel's equations).
+float leaving_mean(float ior) {
+    float inverse = 1.0 / ior;
+    return (1.4399 * inverse - 0.7099) * inverse + 0.3319 - 0.0636 * ior;
+}
+
+// Of the light that a lobe mirrors inside a medium, what the medium's smooth surface lets out: by its first reflection,
+// by the one after it was thrown back once, and by each of those that follow.
+struct LeavingShares {
+    float first;
+    float second;
+    float later;
+};
+
+// In the plane of tangential components a GGX lobe is about a distribution w^2 / (pi (w^2 + x^2)^2) around the mirrored
+// view, and what leaves lies in a circle around 0. The distribution is an even one on a sphere, projected from the
+// pole, so that the light in the circle has a closed form. The polynomial mends its logarithm of odds by what Fresnel's
+// equations let through of sampled GGX lobes: within 0.01 at index 1.5 and alpha 0.1 to 0.4, within 0.03 for indices
+// from 1.3 to 1.8. What was totally reflected comes back at such angles again: by random walks between a lobe and a
+// smooth interface.
+LeavingShares leaving_shares(float alpha, float view_cosine, float ior) {
+    float f0 = ior_to_reflectance(ior);
+    float sine2 = 1.0 - view_cosine * view_cosine;
+    float width = 0.00176 +
+                  square(2.0 * alpha * ior / (1.0 + 0.4408 * alpha)) * pow(max(1.0 - sine2 / (ior * ior), 0.0), 1.415);
+    float around = width + sine2 - 0.9946;
+    float side = around * inversesqrt(around * around + 3.9784 * width);
+    float odds = log((1.0 - side) / (1.0 + side));
+    float root = sqrt(alpha);
+    float index = ior - 1.5;
+    odds = -0.6978 + odds * (1.5657 - 0.1394 * odds + root * (-1.2699 + 0.0881 * odds) - 0.5125 * index) +
+           root * (3.2543 - 2.6908 * root - 3.2969 * index) + index * (0.6742 + 0.4503 * index) -
+           sine2 * (0.1998 + 0.2626 * odds + 0.1368 * root + 0.1544 * index + 0.0101 * sine2);
+    // Where the medium is hardly denser all of it leaves.
+    float dense = saturated(10.0 * (ior - 1.0));
+    LeavingShares shares;
+    shares.first = mix(1.0, max(1.0 / (1.0 + exp(-odds)), 0.02), dense);
+    float wide = 0.88 * leaving_mean(ior);
+    float returning = mix(1.0, mix(0.2, wide, 1.0 - exp(-square(4.0 * alpha))), dense);
+    // What the surface reflects within the circle stays in the lobe.
+    float cosine = max(view_cosine, 0.4);
+    float partly = f0 + (1.0 - f0) * power5(1.0 - cosine);
+    partly *= shares.first / (1.0 - partly);
+    float back = max(1.0 - shares.first, 1e-6);
+    shares.second = mix(returning, shares.first, min(partly / back, 1.0));
+    shares.later = mix(1.0, mix(0.12, wide, 1.0 - exp(-pow(3.6 * alpha, 1.8))), dense);
+    return shares;
+}
+
+// Mean of the diffuse model over the directions that leave a medium of index `ior`, against Lambert's.
+float diffuse_below(Closure closure, float ior) {
+#if NACRE_DIFFUSE_MODEL == 1
+    return 1.0;
+#else
+    // Half of what leaves does so below, half above 45 degrees.
+    float sine = 0.70710678 / ior;
+    float cosine = sqrt(1.0 - sine * sine);
+    vec3 along = vec3(sine, 0.0, cosine);
+    vec3 across = vec3(0.0, sine, cosine);
+    vec3 against = vec3(-sine, 0.0, cosine);
+    float sum =
+        diffuse_lobe(closure, along, half_vector_cosine(closure.view, along), half_vector(closure.view, along).z) +
+        diffuse_lobe(closure, across, half_vector_cosine(closure.view, across), half_vector(closure.view, across).z) *
+            2.0 +
+        diffuse_lobe(closure, against, half_vector_cosine(closure.view, against), half_vector(closure.view, against).z);
+    return pi * 0.25 * sum / cosine;
+#endif
+}
+
+// The half of a lobe's light or of the diffuse light that leaves in a direction: what Fresnel's equations let through
+// for unpolarized light, times the cosine outside over that inside and over ior^2. No term is negative.
+float leaving_density(float cosine, float inner_cosine, float ior) {
+    float across = cosine / (cosine + ior * inner_cosine);
+    float along = cosine / (ior * cosine + inner_cosine);
+    return 2.0 / ior * (across * across + along * along);
+}
+
+// Of a lobe that is seen from beyond the angle of total reflection, by the sine that the view would have outside: the
+// same closed form, mended for views as cover_closure tilts them, within 0.02.
+float tilted_leaving_share(float alpha, float sine2, float ior) {
+    float width = 0.0022 + square(2.0 * alpha * ior) * pow(max(1.0 - sine2 / (ior * ior), 0.0), 1.074);
+    float around = width + sine2 - 0.9511;
+    float side = around * inversesqrt(around * around + 3.8044 * width);
+    float odds = log((1.0 - side) / (1.0 + side));
+    float root = sqrt(alpha);
+    float index = ior - 1.5;
+    odds = 0.4861 + odds * (2.2552 + 0.2869 * odds - 1.1758 * root + 0.0732 * index) +
+           root * (2.3905 - 2.5617 * root - 2.0998 * index) + index * (-0.117 + 0.8901 * index);
+    return max(1.0 / (1.0 + exp(-odds)), 0.02);
+}
+
+// A closure that is seen through layers, prepared for the view inside. spread: share of what its specular lobes send
+// that does not come along them, but as diffuse light does, having been scattered on its way. kept: of light that goes
+// up and down once more, what the medium above leaves. ior: of what lies above, against what view and lights are in.
+// view_cosine: outside.
+Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior, float view_cosine) {
     Closure covered = closure;
     vec3 sharp = vec3(1.0) - spread;
     vec3 specular = closure.specular.albedo;
@@ -471,21 +626,69 @@ Closure cover_closure(Closure closure, vec3 spread, float under_interface) {
     }
 #endif
     covered.diffuse += specular * spread;
-    covered.under_interface = under_interface;
-    return with_probabilities(covered);
-}
-
-// Of diffuse light under an interface by the direction that it comes from, relative to its mean: by Schlick's formula
-// the same for all dielectrics. Over the mean of (1 - c)^5 over the lobe of Chan's model (a fit from below, so that no
-// energy is made), or over Lambert's.
-float interface_factor(Closure closure, vec3 light) {
-#if NACRE_DIFFUSE_MODEL == 0
-    float m = 1.0 - min(closure.view.z, 1.0);
-    float mean = mix(0.042 + m * m * (0.03 + 0.0115 * square(square(m))), 0.0374, chan_glossiness(closure.gloss));
+    covered.ior = ior;
+    covered.view_cosine = max(view_cosine, smallest_cosine);
+    if (ior > 1.0) {
+        float alpha = sqrt(closure.specular.area);
+        LeavingShares shares = leaving_shares(alpha, covered.view_cosine, ior);
+        float once = shares.first;
+        // Thrown back once, and again and again.
+        vec3 reflected = min(specular, vec3(1.0)) * kept;
+        vec3 thrown = reflected * (1.0 - once);
+        thrown *= vec3(shares.second) + reflected * ((1.0 - shares.second) * shares.later) /
+                                            (vec3(1.0) - reflected * (1.0 - shares.later));
+        vec3 sum = vec3(once) + thrown;
+        vec3 share = thrown / sum;
+        if (closure.specular.is_mirror) share = vec3(0.0);
+        // Most of it was reflected totally, and leaves by a lobe around what lies beyond that angle; seen from above,
+        // in a ring, for which diffuse light stands. Width and place by random walks.
+        float sine = ior * sqrt(closure.view.x * closure.view.x + closure.view.y * closure.view.y);
+        float aside = 1.0 - square(1.0 - min(3.0 * sine, 1.0));
+        float tilt = aside * (1.0 + min(1.5 * ior * alpha, 0.5 * (ior - 1.0)));
+        float stretch = tilt / max(sine, 1e-6);
+        float inside = tilt / ior;
+        covered.again_view = vec3(closure.view.x * stretch, closure.view.y * stretch,
+                                  sqrt(max(1.0 - inside * inside, 1e-6)));
+        covered.again = covered.specular;
+        covered.again.alpha =
+            min(closure.specular.alpha * (1.4 + 1.8 * square(square(covered.view_cosine))), vec2(1.0));
+        covered.again.area = covered.again.alpha.x * covered.again.alpha.y;
+        covered.again.view_length = ggx_stretched_length(covered.again_view, covered.again.alpha);
+        alpha = sqrt(covered.again.area);
+        float leaving = mix(leaving_shares(alpha, covered.view_cosine, ior).first,
+                            tilted_leaving_share(alpha, tilt * tilt, ior), aside);
+        float ring = 0.05 + 0.4 * power6(covered.view_cosine);
+        covered.again.albedo = covered.specular.albedo * share * (1.0 - ring);
+        covered.diffuse += covered.specular.albedo * share * ring;
+        float single = 1.0 - ggx_albedo(covered.again_view.z, alpha).missing;
+        vec3 peak = covered.again.albedo / (single * leaving);
+#ifdef NACRE_CLOSURE_CURVES
+        covered.again.reflectance.normal = peak;
+        covered.again.reflectance.grazing = peak;
+        covered.again.reflectance.dip = vec3(0.0);
 #else
-    float mean = 0.037;
+        covered.again.reflectance = peak;
+        covered.again.rise = vec3(0.0);
 #endif
-    return mix(1.0, schlick_rest(min(light.z, 1.0), 1.0 - min(light.z, 1.0)) / (1.0 - mean), closure.under_interface);
+        vec3 first = vec3(1.0) / sum;
+        vec3 own = covered.specular.albedo * (once * first);
+        if (closure.specular.is_mirror) first = vec3(0.0);
+        if (closure.specular.is_mirror) own = covered.specular.albedo;
+        covered.specular = scaled_lobe(covered.specular, first);
+        covered.specular.albedo = own;
+#ifdef NACRE_SLAB_SECOND_LOBE
+        if ((closure.features & slab_second_lobe) != 0u) {
+            once = leaving_shares(sqrt(closure.second.area), covered.view_cosine, ior).first;
+            own = covered.second.albedo;
+            covered.second = scaled_lobe(covered.second, vec3(1.0 / once));
+            covered.second.albedo = own;
+        }
+#endif
+        covered.lambert_scale = 1.0 / leaving_mean(ior);
+        covered.diffuse_scale =
+            covered.lambert_scale / mix(1.0, diffuse_below(closure, ior), saturated(5.0 * (ior - 1.0)));
+    }
+    return with_probabilities(covered);
 }
 #endif
 
@@ -500,15 +703,32 @@ vec3 specular_lobe_value(Closure closure, SpecularLobe lobe, vec3 light, vec3 h,
            round_ggx_value(closure.view.z, lobe.view_length, light, h, lobe.area);
 }
 
+#ifdef NACRE_CLOSURE_COVERED
+vec3 again_value(Closure closure, vec3 light) {
+#ifdef NACRE_CLOSURE_CURVES
+    vec3 peak = closure.again.reflectance.normal;
+#else
+    vec3 peak = closure.again.reflectance;
+#endif
+    return peak * ggx_value(closure.again_view, closure.again.view_length, light,
+                            half_vector(closure.again_view, light), closure.again.alpha);
+}
+#endif
+
 float specular_lobe_pdf(SpecularLobe lobe, vec3 view, vec3 light, vec3 h) {
     if (lobe.is_mirror) return 0.0;
     return ggx_pdf(view, lobe.view_length, light, h, lobe.alpha);
 }
 
 // The same where the light is known to be above the surface.
-ClosureValue evaluate_closure_above(Closure closure, vec3 light) {
+ClosureValue evaluate_closure_above(Closure closure, vec3 outside) {
     ClosureValue value;
     value.subsurface = vec3(0.0);
+#ifdef NACRE_CLOSURE_COVERED
+    vec3 light = refracted_direction(outside, closure.ior);
+#else
+    vec3 light = outside;
+#endif
     // Both are above the surface: their sum has a length. Half of it is the cosine to their half vector.
     vec3 sum = closure.view + light;
     float length_squared = dot(sum, sum);
@@ -526,25 +746,34 @@ ClosureValue evaluate_closure_above(Closure closure, vec3 light) {
     if ((closure.features & slab_second_lobe) != 0u)
         value.specular += specular_lobe_value(closure, closure.second, light, h, half_cosine);
 #endif
+#ifdef NACRE_CLOSURE_COVERED
+    float leaving = 1.0;
+    float diffuse_scale = 1.0;
+    float lambert_scale = 1.0;
+    if (closure.ior > 1.0) {
+        leaving = leaving_density(outside.z, light.z, closure.ior);
+        value.specular = (value.specular + again_value(closure, light)) * leaving;
+        diffuse_scale = leaving * closure.diffuse_scale;
+        lambert_scale = leaving * closure.lambert_scale;
+    }
+#endif
 #ifdef NACRE_SLAB_SPECULAR_LUT
     if ((closure.features & slab_specular_lut) != 0u)
         value.specular *= specular_tint(closure.specular_lut, closure.view.z, light.z);
 #endif
 #ifdef NACRE_SLAB_FUZZ
-    if ((closure.features & slab_fuzz) != 0u) value.specular += closure.fuzz * sheen_density(closure.fuzz_map, light);
+    if ((closure.features & slab_fuzz) != 0u) value.specular += closure.fuzz * sheen_density(closure.fuzz_map, outside);
 #endif
     value.diffuse = closure.diffuse * diffuse_lobe(closure, light, half_cosine, h.z);
+    float lambert = light.z * inverse_pi;
+#ifdef NACRE_CLOSURE_COVERED
+    value.diffuse *= diffuse_scale;
+    lambert *= lambert_scale;
+#endif
 #ifdef NACRE_SLAB_MEDIUM
     if ((closure.features & slab_medium) != 0u) {
-        value.diffuse += closure.thin * (light.z * inverse_pi);
-        value.subsurface = closure.subsurface * (light.z * inverse_pi);
-    }
-#endif
-#ifdef NACRE_CLOSURE_COVERED
-    if (closure.under_interface > 0.0) {
-        float factor = interface_factor(closure, light);
-        value.diffuse *= factor;
-        value.subsurface *= factor;
+        value.diffuse += closure.thin * lambert;
+        value.subsurface = closure.subsurface * lambert;
     }
 #endif
     return value;
@@ -570,11 +799,24 @@ float closure_pdf(Closure closure, vec3 light) {
         return closure.transmission_probability * (-light.z * inverse_pi);
 #endif
     if (light.z <= 0.0) return 0.0;
-    vec3 h = half_vector(closure.view, light);
-    float pdf = closure.specular_probability * specular_lobe_pdf(closure.specular, closure.view, light, h);
+#ifdef NACRE_CLOSURE_COVERED
+    vec3 inner = refracted_direction(light, closure.ior);
+#else
+    vec3 inner = light;
+#endif
+    vec3 h = half_vector(closure.view, inner);
+    float pdf = closure.specular_probability * specular_lobe_pdf(closure.specular, closure.view, inner, h);
 #ifdef NACRE_SLAB_SECOND_LOBE
     if ((closure.features & slab_second_lobe) != 0u)
-        pdf += closure.second_probability * specular_lobe_pdf(closure.second, closure.view, light, h);
+        pdf += closure.second_probability * specular_lobe_pdf(closure.second, closure.view, inner, h);
+#endif
+#ifdef NACRE_CLOSURE_COVERED
+    if (closure.ior > 1.0) {
+        pdf += closure.again_probability * specular_lobe_pdf(closure.again, closure.again_view, inner,
+                                                             half_vector(closure.again_view, inner));
+        // Solid angle inside to that outside.
+        pdf *= light.z / (closure.ior * closure.ior * inner.z);
+    }
 #endif
 #ifdef NACRE_SLAB_FUZZ
     if ((closure.features & slab_fuzz) != 0u) pdf += closure.fuzz_probability * sheen_density(closure.fuzz_map, light);
@@ -582,7 +824,8 @@ float closure_pdf(Closure closure, vec3 light) {
     return pdf + closure.diffuse_probability * light.z * inverse_pi;
 }
 
-ClosureSample sample_specular_lobe(SpecularLobe lobe, vec3 view, float probability, float random_x, float random_y) {
+ClosureSample sample_specular_lobe(Closure closure, SpecularLobe lobe, vec3 view, float probability, float random_x,
+                                   float random_y) {
     ClosureSample result;
     result.is_mirror = lobe.is_mirror;
     result.pdf = 0.0;
@@ -594,6 +837,16 @@ ClosureSample sample_specular_lobe(SpecularLobe lobe, vec3 view, float probabili
     } else {
         result.direction = ggx_sample(view, lobe.view_length, lobe.alpha, random_x, random_y);
     }
+#ifdef NACRE_CLOSURE_COVERED
+    if (closure.ior > 1.0) {
+        // What is totally reflected is lost: the other lobe has it.
+        vec3 inside = result.direction;
+        float tangential = closure.ior * closure.ior * (inside.x * inside.x + inside.y * inside.y);
+        float outside = inside.z > 0.0 ? sqrt(max(1.0 - tangential, 0.0)) : inside.z;
+        if (lobe.is_mirror) outside = closure.view_cosine;
+        result.direction = vec3(closure.ior * inside.x, closure.ior * inside.y, outside);
+    }
+#endif
     return result;
 }
 
@@ -631,12 +884,23 @@ ClosureSample sample_closure(Closure closure, vec3 random) {
         left -= closure.second_probability;
         chosen = left < 0.0;
         if (chosen)
-            result = sample_specular_lobe(closure.second, closure.view, closure.second_probability, random.y, random.z);
+            result = sample_specular_lobe(closure, closure.second, closure.view, closure.second_probability, random.y,
+                                          random.z);
+    }
+#endif
+#ifdef NACRE_CLOSURE_COVERED
+    if (!chosen && closure.ior > 1.0) {
+        left -= closure.again_probability;
+        chosen = left < 0.0;
+        if (chosen)
+            result = sample_specular_lobe(closure, closure.again, closure.again_view, closure.again_probability,
+                                          random.y, random.z);
     }
 #endif
     if (!chosen && closure.specular_probability <= 0.0) return result;
     if (!chosen)
-        result = sample_specular_lobe(closure.specular, closure.view, closure.specular_probability, random.y, random.z);
+        result = sample_specular_lobe(closure, closure.specular, closure.view, closure.specular_probability, random.y,
+                                      random.z);
     // Microfacets also send light below the surface, where it is lost.
     if (result.is_mirror || (!is_through && result.direction.z <= 0.0)) return result;
     result.pdf = closure_pdf(closure, result.direction);
@@ -656,6 +920,9 @@ ClosureAlbedo closure_albedo(Closure closure) {
 #endif
 #ifdef NACRE_SLAB_FUZZ
     if ((closure.features & slab_fuzz) != 0u) albedo.fuzz = closure.fuzz;
+#endif
+#ifdef NACRE_CLOSURE_COVERED
+    if (closure.ior > 1.0) albedo.specular += closure.again.albedo;
 #endif
     albedo.diffuse = closure.diffuse;
     albedo.transmission = vec3(0.0);
