@@ -314,6 +314,11 @@ SpecularLobe dielectric_lobe(SpecularLobe lobe, Slab slab, float view_cosine) {
         float cosine = ggx_typical_cosine(min(view_cosine, 1.0), sqrt(lobe.area));
         vec3 excess = vec3(dielectric_excess(slab.f0.x, cosine), dielectric_excess(slab.f0.y, cosine),
                            dielectric_excess(slab.f0.z, cosine));
+        // A medium that lets nothing through is no other than none.
+        vec3 depth = vec3(optical_depth(slab.mean_free_path.x, slab.thickness),
+                          optical_depth(slab.mean_free_path.y, slab.thickness),
+                          optical_depth(slab.mean_free_path.z, slab.thickness));
+        excess = mix(vec3(1.0), excess, vec3(1.0) / (vec3(1.0) + depth * (1.0 / 64.0)));
         // At least half of the light stays in rough lobes, whose facets are not all seen from one angle.
         vec3 albedo = max(lobe.albedo + lobe.passed * (vec3(1.0) - excess), 0.5 * lobe.albedo);
         result = scaled_lobe(lobe, albedo / max(lobe.albedo, vec3(1e-30)));

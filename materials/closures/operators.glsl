@@ -362,9 +362,10 @@ float alpha2_of_both(float alpha2_a, vec3 mirrored_a, float alpha2_b, vec3 mirro
 // Of two media, by how deep each is and how much it covers.
 float slant_of_both(float slant_a, vec3 transmittance_a, float share_a, float slant_b, vec3 transmittance_b,
                     float share_b) {
-    float a = share_a * minus_log_rest(saturated(1.0 - dot(transmittance_a, vec3(1.0 / 3.0))));
-    float b = share_b * minus_log_rest(saturated(1.0 - dot(transmittance_b, vec3(1.0 / 3.0))));
-    return (a * slant_a + b * slant_b + 1e-6) / (a + b + 1e-6);
+    float a = share_a * -log(clamp(dot(transmittance_a, vec3(1.0 / 3.0)), 1e-3, 1.0));
+    float b = share_b * -log(clamp(dot(transmittance_b, vec3(1.0 / 3.0)), 1e-3, 1.0));
+    // What hardly absorbs has no slant that tells, and of what takes all but a thousandth no digits are left.
+    return (a * slant_a + b * slant_b + 1e-5) / (a + b + 1e-5);
 }
 
 // Side by side: a on 1 - amount of the surface, b on the rest.
@@ -482,7 +483,8 @@ Closure closure_below_path(Closure closure, Path path, float view_cosine) {
     // Light that is thrown back goes through the medium that is as dense as what lies directly above, not through what
     // lies above that.
     float dense = saturated((1.0 - path.slant) / max(1.0 - 1.0 / (path.ior * path.ior), 1e-6));
-    vec3 kept = exp(log(max(path.transmittance, vec3(1e-30))) * (2.0 * dense / max(closure.view.z, 0.1)));
+    vec3 twice = exp(log(max(path.transmittance, vec3(1e-30))) * (2.0 / max(closure.view.z, 0.1)));
+    vec3 kept = mix(vec3(1.0), twice, dense);
     return cover_closure(closure, path.spread, kept, path.ior, view_cosine);
 }
 
