@@ -109,7 +109,7 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
                                                        topology.frames.begin());
         result.closure = library.closure_below(result.slab, result.path, turned(view, result.rotation), footprint);
         result.coverage =
-            library.slab_coverage(result.slab, library.refracted_direction(view, result.path.ior).z);
+            library.slab_coverage(result.slab, library.refracted_direction(view, result.path.ior_excess).z);
         shaded.closures.push_back(result);
     }
     return shaded;

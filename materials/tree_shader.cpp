@@ -234,7 +234,7 @@ class Printer {
             print(
                 "    state.slabs[{0}] = slab_{1};\n    state.slabs[{0}].features = {4}u;\n    state.paths[{0}] = "
                 "path_{2};\n"
-                "    state.coverages[{0}] = slab_coverage(slab_{1}, refracted_direction(views[{3}], path_{2}.ior).z);\n",
+                "    state.coverages[{0}] = slab_coverage(slab_{1}, refracted_direction(views[{3}], path_{2}.ior_excess).z);\n",
                 i, closure.slab, closure.path, frame_slot(closure.frame), closure.features);
         }
         print("    return state;\n}}\n");

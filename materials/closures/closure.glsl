@@ -45,7 +45,7 @@
 //
 // With NACRE_CLOSURE_COVERED (materials/closures/operators.glsl defines it) closures may be seen through layers. They
 // are prepared for the view as it goes on inside; the lights are those outside, as ever:
-//     Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior, float view_cosine)
+//     Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior_excess, float view_cosine)
 //
 // Who includes this provides the tables (materials/closures/tables.glsl, medium.glsl) and, where a slab may have
 // slab_specular_lut, vec3 specular_lut(uint index, vec2 at): the tint by the cosines of view and light to the normal.
@@ -150,7 +150,7 @@ struct Closure {
     uint specular_lut;
 #endif
 #ifdef NACRE_CLOSURE_COVERED
-    float ior;              // of what lies above; `view` and the lobes are inside it
+    float ior_excess;       // index - 1 of what lies above; `view` and the lobes are inside it
     float view_cosine;      // outside
     SpecularLobe again;     // what the layers above have thrown back to the lobe, once or more often
     vec3 again_view;        // what that lobe is seen from
@@ -266,6 +266,12 @@ Fresnel slab_fresnel(Slab slab) {
 // Index of refraction of a slab's medium by the reflectance of its interface. What reflects more than diamond does is
 // metal and hardly lets light through; how it would refract does not matter.
 float medium_ior(float f0) { return reflectance_to_ior(min(f0, 0.2)); }
+
+// medium_ior - 1, with all digits where the medium is hardly denser.
+float medium_ior_excess(float f0) {
+    float root = sqrt(clamp(f0, 0.0, 0.2));
+    return 2.0 * root / (1.0 - root);
+}
 
 // Of diffuse light that hits the interface from the medium's side, what leaves: through a denser medium's surface as
 // much as enters it, spread over index^2 times the angle. At least 0.05, which is less than any dielectric's, so that
@@ -392,7 +398,7 @@ Closure with_probabilities(Closure closure) {
     sum += result.transmission_probability;
 #endif
 #ifdef NACRE_CLOSURE_COVERED
-    result.again_probability = closure.ior > 1.0 ? largest(closure.again.albedo) : 0.0;
+    result.again_probability = closure.ior_excess > 0.0 ? largest(closure.again.albedo) : 0.0;
     sum += result.again_probability;
 #endif
     // One over less would be infinite.
@@ -508,7 +514,7 @@ Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprin
     }
 #endif
 #ifdef NACRE_CLOSURE_COVERED
-    closure.ior = 1.0;
+    closure.ior_excess = 0.0;
     closure.view_cosine = closure.view.z;
     closure.again = scaled_lobe(closure.specular, vec3(0.0));
     closure.again_view = closure.view;
@@ -617,9 +623,10 @@ float tilted_leaving_share(float alpha, float sine2, float ior) {
 
 // A closure that is seen through layers, prepared for the view inside. spread: share of what its specular lobes send
 // that does not come along them, but as diffuse light does, having been scattered on its way. kept: of light that goes
-// up and down once more, what the medium above leaves. ior: of what lies above, against what view and lights are in.
+// up and down once more, what the medium above leaves. ior_excess: index - 1 of what lies above, against what the view
+// and the lights outside are in.
 // view_cosine: outside.
-Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior, float view_cosine) {
+Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior_excess, float view_cosine) {
     Closure covered = closure;
     vec3 sharp = vec3(1.0) - spread;
     vec3 specular = closure.specular.albedo;
@@ -631,9 +638,10 @@ Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior, float 
     }
 #endif
     covered.diffuse += specular * spread;
-    covered.ior = ior;
+    covered.ior_excess = ior_excess;
     covered.view_cosine = max(view_cosine, smallest_cosine);
-    if (ior > 1.0) {
+    if (ior_excess > 0.0) {
+        float ior = 1.0 + ior_excess;
         float alpha = sqrt(closure.specular.area);
         LeavingShares shares = leaving_shares(alpha, covered.view_cosine, ior);
         float once = shares.first;
@@ -649,7 +657,7 @@ Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior, float 
         // in a ring, for which diffuse light stands. Width and place by random walks.
         float sine = ior * sqrt(closure.view.x * closure.view.x + closure.view.y * closure.view.y);
         float aside = 1.0 - square(1.0 - min(3.0 * sine, 1.0));
-        float tilt = aside * (1.0 + min(1.5 * ior * alpha, 0.5 * (ior - 1.0)));
+        float tilt = aside * (1.0 + min(1.5 * ior * alpha, 0.5 * ior_excess));
         float stretch = tilt / max(sine, 1e-6);
         float inside = tilt / ior;
         covered.again_view = vec3(closure.view.x * stretch, closure.view.y * stretch,
@@ -691,7 +699,7 @@ Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior, float 
 #endif
         covered.lambert_scale = 1.0 / leaving_mean(ior);
         covered.diffuse_scale =
-            covered.lambert_scale / mix(1.0, diffuse_below(closure, ior), saturated(5.0 * (ior - 1.0)));
+            covered.lambert_scale / mix(1.0, diffuse_below(closure, ior), saturated(5.0 * ior_excess));
     }
     return with_probabilities(covered);
 }
@@ -730,7 +738,7 @@ ClosureValue evaluate_closure_above(Closure closure, vec3 outside) {
     ClosureValue value;
     value.subsurface = vec3(0.0);
 #ifdef NACRE_CLOSURE_COVERED
-    vec3 light = refracted_direction(outside, closure.ior);
+    vec3 light = refracted_direction(outside, closure.ior_excess);
 #else
     vec3 light = outside;
 #endif
@@ -755,8 +763,8 @@ ClosureValue evaluate_closure_above(Closure closure, vec3 outside) {
     float leaving = 1.0;
     float diffuse_scale = 1.0;
     float lambert_scale = 1.0;
-    if (closure.ior > 1.0) {
-        leaving = leaving_density(outside.z, light.z, closure.ior);
+    if (closure.ior_excess > 0.0) {
+        leaving = leaving_density(outside.z, light.z, 1.0 + closure.ior_excess);
         value.specular = (value.specular + again_value(closure, light)) * leaving;
         diffuse_scale = leaving * closure.diffuse_scale;
         lambert_scale = leaving * closure.lambert_scale;
@@ -805,7 +813,7 @@ float closure_pdf(Closure closure, vec3 light) {
 #endif
     if (light.z <= 0.0) return 0.0;
 #ifdef NACRE_CLOSURE_COVERED
-    vec3 inner = refracted_direction(light, closure.ior);
+    vec3 inner = refracted_direction(light, closure.ior_excess);
 #else
     vec3 inner = light;
 #endif
@@ -816,11 +824,11 @@ float closure_pdf(Closure closure, vec3 light) {
         pdf += closure.second_probability * specular_lobe_pdf(closure.second, closure.view, inner, h);
 #endif
 #ifdef NACRE_CLOSURE_COVERED
-    if (closure.ior > 1.0) {
+    if (closure.ior_excess > 0.0) {
         pdf += closure.again_probability * specular_lobe_pdf(closure.again, closure.again_view, inner,
                                                              half_vector(closure.again_view, inner));
         // Solid angle inside to that outside.
-        pdf *= light.z / (closure.ior * closure.ior * inner.z);
+        pdf *= light.z / (square(1.0 + closure.ior_excess) * inner.z);
     }
 #endif
 #ifdef NACRE_SLAB_FUZZ
@@ -843,13 +851,14 @@ ClosureSample sample_specular_lobe(Closure closure, SpecularLobe lobe, vec3 view
         result.direction = ggx_sample(view, lobe.view_length, lobe.alpha, random_x, random_y);
     }
 #ifdef NACRE_CLOSURE_COVERED
-    if (closure.ior > 1.0) {
+    if (closure.ior_excess > 0.0) {
         // What is totally reflected is lost: the other lobe has it.
         vec3 inside = result.direction;
-        float tangential = closure.ior * closure.ior * (inside.x * inside.x + inside.y * inside.y);
+        float ior = 1.0 + closure.ior_excess;
+        float tangential = ior * ior * (inside.x * inside.x + inside.y * inside.y);
         float outside = inside.z > 0.0 ? sqrt(max(1.0 - tangential, 0.0)) : inside.z;
         if (lobe.is_mirror) outside = closure.view_cosine;
-        result.direction = vec3(closure.ior * inside.x, closure.ior * inside.y, outside);
+        result.direction = vec3(ior * inside.x, ior * inside.y, outside);
     }
 #endif
     return result;
@@ -894,7 +903,7 @@ ClosureSample sample_closure(Closure closure, vec3 random) {
     }
 #endif
 #ifdef NACRE_CLOSURE_COVERED
-    if (!chosen && closure.ior > 1.0) {
+    if (!chosen && closure.ior_excess > 0.0) {
         left -= closure.again_probability;
         chosen = left < 0.0;
         if (chosen)
@@ -927,7 +936,7 @@ ClosureAlbedo closure_albedo(Closure closure) {
     if ((closure.features & slab_fuzz) != 0u) albedo.fuzz = closure.fuzz;
 #endif
 #ifdef NACRE_CLOSURE_COVERED
-    if (closure.ior > 1.0) albedo.specular += closure.again.albedo;
+    if (closure.ior_excess > 0.0) albedo.specular += closure.again.albedo;
 #endif
     albedo.diffuse = closure.diffuse;
     albedo.transmission = vec3(0.0);

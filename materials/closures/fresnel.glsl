@@ -100,12 +100,15 @@ float dielectric_transmittance(float cosine, float inner_cosine, float ior) {
     return 2.0 * ior * inner_cosine / cosine * (across * across + along * along);
 }
 
-// A direction above a medium of index `ior`, 1 or more, as it goes on inside. Every term is positive, as above.
-vec3 refracted_direction(vec3 direction, float ior) {
-    float inverse = 1.0 / ior;
-    float inside = sqrt((ior - 1.0) * (ior + 1.0) + direction.z * direction.z) * inverse;
-    return vec3(direction.x * inverse, direction.y * inverse, ior > 1.0 ? inside : direction.z);
+// A direction as it goes on below, in a medium whose index is 1 + `ior_excess`. Every term is positive, as above.
+vec3 refracted_direction(vec3 direction, float ior_excess) {
+    float inverse = 1.0 / (1.0 + ior_excess);
+    float inside = sqrt(ior_excess * (ior_excess + 2.0) + direction.z * direction.z) * inverse;
+    return vec3(direction.x * inverse, direction.y * inverse, ior_excess > 0.0 ? inside : direction.z);
 }
+
+// 1 - 1 / ior^2.
+float refraction_bend(float ior_excess) { return ior_excess * (ior_excess + 2.0) / square(1.0 + ior_excess); }
 
 // Reflectance at normal incidence of what lies under a medium of index coat_ior, from its reflectance in air. Exact for
 // dielectrics: the index comes back from the reflectance.

@@ -26,16 +26,16 @@ float refraction_variance(float roughness, float ior) {
 // A lobe that enters a denser medium is narrower inside by its index; its variance is a power of alpha.
 float refraction_squeeze(float ior) { return pow(ior, -1.1); }
 
-// How what lies below is seen: in the directions that are refracted into a medium of index `ior` against what is above
+// How what lies below is seen: in the directions that are refracted into a medium of some index against what is above
 // all matter, and its lobes there with `variance` in addition.
 struct Widening {
-    float ior;
+    float ior_excess;  // index - 1: small ones keep their digits, which grazing directions need
     float variance;
 };
 
 Widening no_widening() {
     Widening widening;
-    widening.ior = 1.0;
+    widening.ior_excess = 0.0;
     widening.variance = 0.0;
     return widening;
 }
@@ -47,7 +47,7 @@ float tracked_roughness(float roughness, Widening widening) {
 }
 
 // The view as a slab meets it.
-vec3 view_below(vec3 view, Widening widening) { return refracted_direction(view, widening.ior); }
+vec3 view_below(vec3 view, Widening widening) { return refracted_direction(view, widening.ior_excess); }
 
 // What the operators of a tree do to the matter they arrange: what is tracked follows Hillaire and de Rousiers,
 // "Authoring Materials that matter", SIGGRAPH 2023; the formulae are ours. Any subtree counts as one piece of matter
@@ -60,8 +60,8 @@ vec3 either(vec3 a, vec3 b) { return a + b * (vec3(1.0) - a); }
 // How much what is seen through a subtree spreads. Known before any closure is, since closures depend on it.
 struct Spread {
     float coverage;
-    float ior;       // of the covered share, against what lies above it
-    float variance;  // that the covered share adds to what lies below, inside
+    float ior_excess;  // index - 1 of the covered share, against what lies above it
+    float variance;    // that the covered share adds to what lies below, inside
 };
 
 // What a layer does with light from below: what it throws back, what leaves it, and the rest, which has its own
@@ -89,7 +89,7 @@ struct Matter {
     vec3 gloss;               // share of what is reflected towards the view that a lobe mirrors
     float alpha2;             // squared GGX alpha of that lobe, as it is seen from directly above
     float ior;                // against what lies above
-    float slant;              // 1 / ior^2 of what `transmittance` lies in: how directions there follow those above
+    float bend;               // 1 - 1 / ior^2 of what `transmittance` lies in: how directions turn towards the normal
     vec3 scattered;           // of light that passes, share that was scattered, and not only forwards
     float cos_view;           // of the view as it comes from above
 };
@@ -100,8 +100,8 @@ struct Path {
     vec3 uncovered;         // share of `weight` that passes by all matter above, [0, 1]
     vec3 transmittance;     // of the rest for light, along the normal; top_transmittance turns it to the light
     vec3 spread;            // share of what a lobe mirrors that comes up as diffuse light
-    float ior;              // of what lies directly above the slab, against what is above all matter
-    float slant;            // 1 / ior^2 of what `transmittance` lies in
+    float ior_excess;       // index - 1 of what lies directly above the slab, against what is above all matter
+    float bend;             // 1 - 1 / ior^2 of what `transmittance` lies in
 };
 
 #ifndef NACRE_SLAB_EDGE_COVERAGE
@@ -112,14 +112,13 @@ float slab_bare(Slab slab, float cos_theta) { return max(1.0 - slab.coverage, 0.
 Spread slab_spread(Slab slab, float cos_view) {
     Spread spread;
     spread.coverage = slab_coverage(slab, cos_view);
-    spread.ior = 1.0;
+    spread.ior_excess = 0.0;
     spread.variance = 0.0;
 #ifdef NACRE_SLAB_MEDIUM
     // Nothing is seen through the others.
     if ((slab.features & slab_medium) != 0u) {
-        float ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
-        spread.ior = ior;
-        spread.variance = refraction_variance(slab.roughness, ior);
+        spread.ior_excess = medium_ior_excess(dot(slab.f0, vec3(1.0 / 3.0)));
+        spread.variance = refraction_variance(slab.roughness, 1.0 + spread.ior_excess);
     }
 #endif
     return spread;
@@ -135,7 +134,7 @@ Spread mix_spread(Spread a, Spread b, float amount) {
     Spread spread;
     spread.coverage = (1.0 - amount) * a.coverage + amount * b.coverage;
     float share = amount * b.coverage / max(spread.coverage, 1e-30);
-    spread.ior = mix(a.ior, b.ior, share);
+    spread.ior_excess = mix(a.ior_excess, b.ior_excess, share);
     spread.variance = mix(a.variance, b.variance, share);
     return spread;
 }
@@ -146,9 +145,9 @@ const float largest_ior = 2.6;
 // What lies below a layer, by what is above both.
 Widening widening_below(Widening above, Spread top) {
     Widening widening;
-    float ior = mix(1.0, top.ior, top.coverage);
-    widening.ior = min(above.ior * ior, largest_ior);
-    widening.variance = above.variance * refraction_squeeze(ior) + top.coverage * top.variance;
+    float excess = top.ior_excess * top.coverage;
+    widening.ior_excess = min(above.ior_excess + excess + above.ior_excess * excess, largest_ior - 1.0);
+    widening.variance = above.variance * refraction_squeeze(1.0 + excess) + top.coverage * top.variance;
     return widening;
 }
 
@@ -158,7 +157,7 @@ Spread layer_spread(Spread top, Spread base) {
     Spread spread;
     spread.coverage = top.coverage + (1.0 - top.coverage) * base.coverage;
     float covered = max(spread.coverage, 1e-30);
-    spread.ior = 1.0 + (both.ior - 1.0) / covered;
+    spread.ior_excess = both.ior_excess / covered;
     spread.variance = both.variance / covered;
     return spread;
 }
@@ -186,7 +185,7 @@ Matter no_matter() {
     m.gloss = vec3(0.0);
     m.alpha2 = 0.0;
     m.ior = 1.0;
-    m.slant = 1.0;
+    m.bend = 0.0;
     m.scattered = vec3(0.0);
     m.cos_view = 1.0;
     return m;
@@ -206,8 +205,8 @@ Path open_path() {
     path.uncovered = vec3(1.0);
     path.transmittance = vec3(1.0);
     path.spread = vec3(0.0);
-    path.ior = 1.0;
-    path.slant = 1.0;
+    path.ior_excess = 0.0;
+    path.bend = 0.0;
     return path;
 }
 
@@ -234,8 +233,9 @@ Matter base_matter(Slab slab, float cos_view) {
     m.bare = slab_bare(slab, cos_view);
     m.cos_view = cos_view;
     m.alpha2 = square(square(slab.roughness));
-    m.ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
-    m.slant = 1.0 / square(m.ior);
+    float excess = medium_ior_excess(dot(slab.f0, vec3(1.0 / 3.0)));
+    m.ior = 1.0 + excess;
+    m.bend = refraction_bend(excess);
     vec3 leaving = internal_transmittance(slab);
     vec3 inwards = internal_reflectance(slab);
     // Of the medium, and of the medium under its interface.
@@ -360,12 +360,12 @@ float alpha2_of_both(float alpha2_a, vec3 mirrored_a, float alpha2_b, vec3 mirro
 }
 
 // Of two media, by how deep each is and how much it covers.
-float slant_of_both(float slant_a, vec3 transmittance_a, float share_a, float slant_b, vec3 transmittance_b,
+float bend_of_both(float bend_a, vec3 transmittance_a, float share_a, float bend_b, vec3 transmittance_b,
                     float share_b) {
     float a = share_a * -log(clamp(dot(transmittance_a, vec3(1.0 / 3.0)), 1e-3, 1.0));
     float b = share_b * -log(clamp(dot(transmittance_b, vec3(1.0 / 3.0)), 1e-3, 1.0));
-    // What hardly absorbs has no slant that tells, and of what takes all but a thousandth no digits are left.
-    return (a * slant_a + b * slant_b + 1e-5) / (a + b + 1e-5);
+    // What hardly absorbs bends nothing that tells, and of what takes all but a thousandth no digits are left.
+    return (a * bend_a + b * bend_b) / (a + b + 1e-5);
 }
 
 // Side by side: a on 1 - amount of the surface, b on the rest.
@@ -388,7 +388,7 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     m.gloss = gloss_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
     m.alpha2 = alpha2_of_both(a.alpha2, covered_a * a.albedo * a.gloss, b.alpha2, covered_b * b.albedo * b.gloss);
     m.ior = mix(a.ior, b.ior, share);
-    m.slant = slant_of_both(a.slant, a.transmittance, covered_a, b.slant, b.transmittance, covered_b);
+    m.bend = bend_of_both(a.bend, a.transmittance, covered_a, b.bend, b.transmittance, covered_b);
     m.scattered = mix(a.scattered, b.scattered, share);
     m.cos_view = a.cos_view;
     return m;
@@ -438,8 +438,7 @@ Matter layer_matter(Matter top, Matter base) {
     m.gloss = gloss_of_both(top, of_top, base, of_base);
     m.alpha2 = alpha2_of_both(top.alpha2, of_top * top.gloss,
                               base.alpha2 * square(mix(1.0, top.ior, tb / max(b + tb, 1e-30))), of_base * base.gloss);
-    m.slant =
-        slant_of_both(top.slant, top.transmittance, t + tb, base.slant / square(top.ior), base.transmittance, b + tb);
+    m.bend = bend_of_both(top.bend, top.transmittance, t + tb, either(top.bend, base.bend), base.transmittance, b + tb);
     m.scattered = either(top.scattered * (t + tb), base.scattered * (b + tb));
     m.ior = mix(1.0, top.ior, t + tb) * mix(1.0, base.ior, b + tb);
     m.cos_view = top.cos_view;
@@ -466,9 +465,9 @@ Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     above.weight = path.weight * sum;
     // Scattered on its way to the base or on its way back.
     above.spread = either(path.spread, either(top.scattered, top.scattered) * through / max(sum, vec3(1e-30)));
-    above.ior = widening.ior;
-    above.slant = slant_of_both(path.slant, path.transmittance, 1.0, top.slant / square(path.ior), top.transmittance,
-                                top.coverage);
+    above.ior_excess = widening.ior_excess;
+    above.bend = bend_of_both(path.bend, path.transmittance, 1.0, either(refraction_bend(path.ior_excess), top.bend),
+                              top.transmittance, top.coverage);
     above.uncovered = path.uncovered * by;
     // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
     // that stands for both is between.
@@ -478,25 +477,25 @@ Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     return above;
 }
 
-// A closure that was prepared for the view refracted by path.ior, under all that lies above it. view_cosine: outside.
+// A closure that was prepared for the view refracted by path.ior_excess, under all that lies above it. view_cosine: outside.
 Closure closure_below_path(Closure closure, Path path, float view_cosine) {
     // Light that is thrown back goes through the medium that is as dense as what lies directly above, not through what
     // lies above that.
-    float dense = saturated((1.0 - path.slant) / max(1.0 - 1.0 / (path.ior * path.ior), 1e-6));
+    float dense = saturated(path.bend / max(refraction_bend(path.ior_excess), 1e-6));
     vec3 twice = exp(log(max(path.transmittance, vec3(1e-30))) * (2.0 / max(closure.view.z, 0.1)));
     vec3 kept = mix(vec3(1.0), twice, dense);
-    return cover_closure(closure, path.spread, kept, path.ior, view_cosine);
+    return cover_closure(closure, path.spread, kept, path.ior_excess, view_cosine);
 }
 
 // The closure of a slab as it is seen through all that lies above it, by the view outside.
 Closure closure_below(Slab slab, Path path, vec3 view, float footprint) {
-    return closure_below_path(prepare_closure(slab, refracted_direction(view, path.ior), footprint), path, view.z);
+    return closure_below_path(prepare_closure(slab, refracted_direction(view, path.ior_excess), footprint), path, view.z);
 }
 
 // Light's way down to a slab, from the cosine outside: the layers' transmittance along the refracted direction, and 1
 // on the uncovered share. Where nothing refracts, no light from below a hundredth comes through what tells.
 vec3 top_transmittance(Path path, float cos_light) {
-    float inverse_cosine = inversesqrt(max((1.0 - path.slant) + cos_light * cos_light * path.slant, 1e-4));
+    float inverse_cosine = inversesqrt(max(path.bend + cos_light * cos_light * (1.0 - path.bend), 1e-4));
     vec3 along = exp(log(max(path.transmittance, vec3(1e-30))) * inverse_cosine);
     return mix(along, vec3(1.0), path.uncovered);
 }

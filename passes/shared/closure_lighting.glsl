@@ -35,7 +35,7 @@ vec3 closure_radiance(Slab slab, Path path, StoredFrame frame, LitPoint point
     if (largest(path.weight) > 0.0) {
         vec3 view = view_in_frame(frame, point.to_viewer);
         Closure closure = closure_below_path(
-            prepare_lit_closure(slab, slab_fresnel(slab), refracted_direction(view, path.ior), point.footprint), path,
+            prepare_lit_closure(slab, slab_fresnel(slab), refracted_direction(view, path.ior_excess), point.footprint), path,
             view.z);
         ClosureValue surroundings = environment_value(slab, closure, frame, point);
         result = surroundings.specular * top_transmittance(path, view.z) +

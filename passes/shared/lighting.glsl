@@ -158,9 +158,9 @@ ClosureValue environment_value(Slab slab, Closure closure, StoredFrame frame, Li
     float roughness = slab.roughness;
 #ifdef NACRE_CLOSURE_COVERED
     // What leaves a denser medium is wider outside; one look serves what was thrown back as well.
-    if (closure.ior > 1.0) {
+    if (closure.ior_excess > 0.0) {
         float share = largest(closure.again.albedo) / max(largest(albedo.specular), 1e-30);
-        roughness = min(sqrt(closure.ior * sqrt(mix(closure.specular.area, closure.again.area, share))), 1.0);
+        roughness = min(sqrt((1.0 + closure.ior_excess) * sqrt(mix(closure.specular.area, closure.again.area, share))), 1.0);
     }
 #endif
     vec3 specular_light = environment_lobe(frame, point.to_viewer, roughness, anisotropy);

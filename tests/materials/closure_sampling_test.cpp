@@ -125,8 +125,8 @@ TEST(ClosureSampling, SamplesBelowALayerFollowTheDensity) {
         for (const double cosine : view_angles) {
             const glm::dvec3 view = direction(cosine, 0.4);
             const auto inside = library.prepare_closure(Library::slab_of(test.slab),
-                                                        library.refracted_direction(view, 1.5), 1e-3);
-            const auto closure = library.cover_closure(inside, glm::dvec3(0.2), glm::dvec3(1.0), 1.5, cosine);
+                                                        library.refracted_direction(view, 0.5), 1e-3);
+            const auto closure = library.cover_closure(inside, glm::dvec3(0.2), glm::dvec3(1.0), 0.5, cosine);
             EXPECT_GT(smallest_probability(library, closure, narrowest_angle(test.slab, cosine), samples, ++seed),
                       limit)
                 << test.name << " seen at cosine " << cosine;
