@@ -361,7 +361,7 @@ float alpha2_of_both(float alpha2_a, vec3 mirrored_a, float alpha2_b, vec3 mirro
 
 // Of two media, by how deep each is and how much it covers.
 float bend_of_both(float bend_a, vec3 transmittance_a, float share_a, float bend_b, vec3 transmittance_b,
-                    float share_b) {
+                   float share_b) {
     float a = share_a * -log(clamp(dot(transmittance_a, vec3(1.0 / 3.0)), 1e-3, 1.0));
     float b = share_b * -log(clamp(dot(transmittance_b, vec3(1.0 / 3.0)), 1e-3, 1.0));
     // What hardly absorbs bends nothing that tells, and of what takes all but a thousandth no digits are left.
@@ -466,24 +466,27 @@ Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     // Scattered on its way to the base or on its way back.
     above.spread = either(path.spread, either(top.scattered, top.scattered) * through / max(sum, vec3(1e-30)));
     above.ior_excess = widening.ior_excess;
-    above.bend = bend_of_both(path.bend, path.transmittance, 1.0, either(refraction_bend(path.ior_excess), top.bend),
-                              top.transmittance, top.coverage);
     above.uncovered = path.uncovered * by;
     // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
     // that stands for both is between.
-    vec3 kept = mix(path.transmittance, vec3(1.0), path.uncovered) * mix(top.transmittance, vec3(1.0), by);
+    vec3 kept_above = mix(path.transmittance, vec3(1.0), path.uncovered);
+    vec3 kept_by_top = mix(top.transmittance, vec3(1.0), by);
+    vec3 kept = kept_above * kept_by_top;
+    above.bend =
+        bend_of_both(path.bend, kept_above, 1.0, either(refraction_bend(path.ior_excess), top.bend), kept_by_top, 1.0);
     vec3 covered = max(vec3(1.0) - above.uncovered, vec3(1e-30));
     above.transmittance = min(max(kept - above.uncovered, vec3(0.0)) / covered, vec3(1.0));
     return above;
 }
 
-// A closure that was prepared for the view refracted by path.ior_excess, under all that lies above it. view_cosine: outside.
+// A closure that was prepared for the view refracted by path.ior_excess, under all that lies above it. view_cosine:
+// outside.
 Closure closure_below_path(Closure closure, Path path, float view_cosine) {
     // Light that is thrown back goes through the medium that is as dense as what lies directly above, not through what
     // lies above that.
     float dense = saturated(path.bend / max(refraction_bend(path.ior_excess), 1e-6));
     vec3 twice = exp(log(max(path.transmittance, vec3(1e-30))) * (2.0 / max(closure.view.z, 0.1)));
-    vec3 kept = mix(vec3(1.0), twice, dense);
+    vec3 kept = mix(vec3(1.0), mix(twice, vec3(1.0), path.uncovered), dense);
     return cover_closure(closure, path.spread, kept, path.ior_excess, view_cosine);
 }
 
