@@ -211,6 +211,48 @@ void lobes(Report& report) {
     });
 }
 
+// Both models of fuzz as closures use them: prepared once for each view, then evaluated for each light.
+void fuzz(Report& report) {
+    Library library;
+    std::vector<glm::dvec3> lights;
+    std::mt19937 random(4);
+    for (int i = 0; i < 256; ++i) {
+        const double u = uniform(random), v = uniform(random);
+        lights.push_back(library.cosine_direction(u, v));
+    }
+    const auto light = [&](int i) { return lights[static_cast<std::size_t>(i) % 256]; };
+    const auto roughness = [](int i) { return 0.1 + 0.9 * (i % 13) / 13.0; };
+    Errors errors, energy;
+    for (double r = 0.1; r <= 1.0; r += 0.15) {
+        for (const double cosine : {1.0, 0.7, 0.4, 0.2, 0.05}) {
+            const glm::dvec3 view = view_at(cosine);
+            const auto map = library.sheen_map(view, r);
+            const auto lobe = library.make_charlie_lobe(cosine, r);
+            const auto charlie = [&](glm::dvec3 l) {
+                return library.charlie_value(lobe, l.z, library.half_vector(view, l));
+            };
+            errors.add(library.sheen_albedo(cosine, r) * hemisphere_integral(96, [&](glm::dvec3 l) {
+                           return std::abs(charlie(l) - library.sheen_density(map, l));
+                       }));
+            energy.add(library.sheen_albedo(cosine, r) * (hemisphere_integral(96, charlie) - 1.0));
+        }
+    }
+    report.add("fuzz by mapped cosines, preparation", "itself", {},
+               nanoseconds(100000, [&](int i) { return library.sheen_map(light(i), roughness(i)).scale; }));
+    report.add("fuzz by mapped cosines, a light", "itself", {}, nanoseconds(100000, [&](int i) {
+                   static const auto map = library.sheen_map(view_at(0.6), 0.4);
+                   return library.sheen_density(map, light(i));
+               }));
+    report.add("fuzz by Charlie, preparation", "mapped cosines, energy of white fuzz", energy,
+               nanoseconds(100000, [&](int i) { return library.make_charlie_lobe(light(i).z, roughness(i)).scale; }));
+    report.add("fuzz by Charlie, a light", "mapped cosines, what differs of white fuzz", errors,
+               nanoseconds(100000, [&](int i) {
+                   static const auto lobe = library.make_charlie_lobe(0.6, 0.4);
+                   // The half vector is there already.
+                   return library.charlie_value(lobe, light(i).z, light(i + 7));
+               }));
+}
+
 // What the G-buffer's bits do to a plain slab: F0 and sRGB-encoded albedo with 7, 7 and 6 bits, roughness with 8.
 void packing(Report& report) {
     Library library;
@@ -272,6 +314,7 @@ int main(int count, char** arguments) {
     layers(report);
     tables(report);
     lobes(report);
+    fuzz(report);
     packing(report);
     if (!json.empty()) std::ofstream(json) << nlohmann::ordered_json{{"rows", report.rows()}}.dump(2) << '\n';
 }

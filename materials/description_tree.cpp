@@ -138,7 +138,11 @@ class Builder {
         Slab slab = common();
         slab.albedo = base_color();
         slab.f0 = glm::vec3(ior_to_f0(std::isfinite(material_.ior) ? material_.ior : 1.5f));
-        if (material_.specular) slab.f0 = unit(slab.f0 * material_.specular->color) * unit(material_.specular->factor);
+        if (material_.specular) {
+            slab.f0 = unit(slab.f0 * material_.specular->color);
+            slab.specular_weight = unit(material_.specular->factor);
+            if (slab.specular_weight < 1.0f || material_.specular->texture.present()) slab.features |= slab_f90;
+        }
         return slab;
     }
 
@@ -146,10 +150,15 @@ class Builder {
         const NodeIndex node = add(slab, name);
         texture_on(node, {.field = "albedo", .texture = material_.base_color_texture});
         if (slab.albedo != glm::vec3(0.0f)) color_by_vertex(node, "albedo");
-        if (material_.specular) {
-            texture_on(node, {.field = "f0", .texture = material_.specular->color_texture});
-        }
+        specular_on(node);
         return node;
+    }
+
+    // Of a dielectric's interface.
+    void specular_on(NodeIndex node) {
+        if (!material_.specular) return;
+        texture_on(node, {.field = "f0", .texture = material_.specular->color_texture});
+        texture_on(node, {.field = "specular_weight", .texture = material_.specular->texture, .channel = 3});
     }
 
     NodeIndex base() {
@@ -202,6 +211,7 @@ class Builder {
                 glass.mean_free_path = transmittance_to_mean_free_path(base_color(), tree_.surface_thickness);
             }
             const NodeIndex node = add(glass, "transmissive");
+            specular_on(node);
             if (material_.volume && material_.volume->thickness > 0.0f) {
                 texture_on(node, {.field = "thickness", .texture = material_.volume->thickness_texture, .channel = 1});
             }
@@ -216,6 +226,7 @@ class Builder {
             sheet.thickness = tree_.surface_thickness;
             sheet.mean_free_path = glm::vec3(tree_.surface_thickness);
             const NodeIndex node = add(sheet, "sheet");
+            specular_on(node);
             texture_on(node, {.field = "albedo", .texture = material_.diffuse_transmission->color_texture});
             root = tree_.mix(root, node, scattered);
             texture_on(root, {.field = "amount", .texture = material_.diffuse_transmission->texture, .channel = 3});

@@ -51,6 +51,7 @@ Slab clamped(const Slab& slab) {
     unit(&Slab::roughness);
     unit(&Slab::albedo);
     unit(&Slab::f90);
+    unit(&Slab::specular_weight);
     unit(&Slab::f82);
     unit(&Slab::second_roughness);
     unit(&Slab::second_weight);

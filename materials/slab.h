@@ -49,6 +49,9 @@ struct Slab {
     /// slab_f90. Color of the reflection at grazing incidence, [0, 1]. Only its color counts: it is scaled until its
     /// largest channel is 1, so that it never takes energy away. Black counts as white.
     glm::vec3 f90{1.0f};
+    /// slab_f90. What the interface reflects at every angle is scaled by this, [0, 1]; the medium gets the rest.
+    /// (KHR_materials_specular has it as the specular factor, which scales F0 and is F90.)
+    float specular_weight = 1.0f;
     /// slab_f82. Reflectance at 82 degrees relative to what Schlick's formula gives there, [0, 1]; 1 changes nothing.
     /// Below 0.01, and where the reflectance would turn negative at some angle (on dark interfaces), it is limited.
     glm::vec3 f82{1.0f};

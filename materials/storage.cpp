@@ -192,7 +192,22 @@ class Layout {
         for (const std::uint32_t one : result_.features) features |= one;
         if ((features & (slab_glints | slab_specular_lut)) != 0) return StorageClass::special;
         if (topology_.closures.size() > 1 || (features & slab_anisotropy) != 0) return StorageClass::complex;
+        // A plain slab has a place for the specular weight.
+        if (features == slab_f90 && is_white_at_grazing_angles(topology_.closures[0].node)) features = 0;
         return features != 0 || result_.media[0] != StoredMedium::opaque ? StorageClass::single : StorageClass::simple;
+    }
+
+    // Whether no slab of the subtree has a color in its F90.
+    bool is_white_at_grazing_angles(NodeIndex index) const {
+        const Node& node = tree_.visible_tree.nodes[index];
+        if (node.kind == NodeKind::slab) {
+            const glm::vec3& f90 = node.slab.f90;
+            return (node.slab.features & slab_f90) == 0 ||
+                   (f90.r == f90.g && f90.g == f90.b &&
+                    std::ranges::find(node.textures, "f90", &TextureInput::field) == node.textures.end());
+        }
+        return is_white_at_grazing_angles(node.first) &&
+               (node.kind == NodeKind::coverage || is_white_at_grazing_angles(node.second));
     }
 
     bool needs_tangent(std::uint32_t frame) const {
@@ -265,6 +280,14 @@ double* number_of(Library::Slab& slab, StorageValue value) {
     }
 }
 
+glm::dvec3 dither_of_color(glm::uvec2 position, std::uint32_t which) {
+    return {library.ordered_dither(position.x, position.y, which),
+            library.ordered_dither(position.x, position.y, which + 1),
+            library.ordered_dither(position.x, position.y, which + 2)};
+}
+
+}  // namespace
+
 std::uint32_t encode_number(const StorageFormat& format, std::uint32_t bits, double value, double dither) {
     switch (format.codec) {
         case StorageCodec::unit: return library.pack_unit((value - format.low) / (format.high - format.low), bits, dither);
@@ -291,13 +314,6 @@ double decode_number(const StorageFormat& format, std::uint32_t bits, std::uint3
         default: return code;
     }
 }
-
-glm::dvec3 dither_of_color(glm::uvec2 position, std::uint32_t which) {
-    return {library.ordered_dither(position.x, position.y, which), library.ordered_dither(position.x, position.y, which + 1),
-            library.ordered_dither(position.x, position.y, which + 2)};
-}
-
-}  // namespace
 
 std::string_view name_of(StorageClass storage_class) {
     switch (storage_class) {
@@ -417,6 +433,7 @@ StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, co
                 break;
             default: {
                 Library::Slab slab = closure->slab;
+                slab.f90 = library.grazing_tint(slab.f90) * slab.specular_weight;
                 if (const glm::dvec3* value = color_of(slab, field.value)) {
                     color(*value);
                 } else if (const double* number = number_of(slab, field.value)) {
@@ -484,6 +501,7 @@ Expected<UnpackedMaterial> unpack_pixel(const StoredPixel& pixel) {
             const std::uint32_t code = read(value);
             if (glm::dvec3* color = color_of(result.slab, value)) {
                 *color = library.unpack_color(code);
+                if (value == StorageValue::f90) result.slab.specular_weight = library.largest(*color);
             } else if (double* number = number_of(result.slab, value)) {
                 *number = decode_number(format, format.bits, code);
             } else if (value == StorageValue::specular_lut) {

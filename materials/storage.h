@@ -79,6 +79,14 @@ struct StorageFormat {
 [[nodiscard]] const StorageFormat& storage_format(StorageValue value);
 [[nodiscard]] std::span<const StorageFormat> storage_formats();
 
+/// A number as pack_pixel() stores it, in `bits` instead of the format's own; for codecs of one number: neither
+/// `integer` nor `color` nor `direction`.
+/// @param dither  in (0, 1); one half rounds. `fraction` and `angle` do without
+[[nodiscard]] std::uint32_t encode_number(const StorageFormat& format, std::uint32_t bits, double value, double dither);
+
+/// Back. Of `integer` the code itself.
+[[nodiscard]] double decode_number(const StorageFormat& format, std::uint32_t bits, std::uint32_t code);
+
 /// A field at its place.
 struct StorageField {
     StorageValue value;
@@ -95,6 +103,8 @@ enum class StoredMedium : std::uint8_t {
     transmittance,  ///< By its own transmittance along the normal.
 };
 
+/// The brightness of a stored F90, which closures do without, is the specular weight.
+///
 /// Material words hold `fields` one after another; the top layer's word (normal and roughness) and the word of
 /// subsurface scattering lie apart, since other passes read them alone.
 struct StorageLayout {

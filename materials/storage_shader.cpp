@@ -201,7 +201,10 @@ class Writer {
                 return encode(format, field.bits, fmt::format("state.paths[{}].bend", closure), next_dither());
             default: break;
         }
-        const std::string value = fmt::format("state.slabs[{}].{}", closure, member_of(field.value));
+        std::string value = fmt::format("state.slabs[{}].{}", closure, member_of(field.value));
+        // Its brightness is not its own.
+        if (field.value == StorageValue::f90)
+            value = fmt::format("grazing_tint({}) * state.slabs[{}].specular_weight", value, closure);
         if (format.codec == StorageCodec::color) return color(value);
         if (format.codec == StorageCodec::integer) return encode(format, field.bits, value, "0.5");
         return encode(format, field.bits, value, next_dither());
@@ -314,6 +317,7 @@ StoredClosure read_stored_closure(inout StoredHeader header, uint index, float t
             open = row.feature;
         }
         print("        slab.{} = {};\n", member_of(row.value), read(row.value));
+        if (row.value == StorageValue::f90) print("        slab.specular_weight = largest(slab.f90);\n");
     }
     print(R"(    }}
 #endif

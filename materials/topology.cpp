@@ -266,6 +266,11 @@ class Flattener {
 Expected<FlattenedTree> flatten(const Tree& tree, const FlattenDesc& desc) {
     NACRE_CHECK(validate(tree));
     FlattenedTree result{.visible_tree = without_invisible_slabs(tree)};
+    if ((desc.dropped_features & slab_f90) != 0) {
+        // What the interface reflects along the normal stays.
+        for (Node& node : result.visible_tree.nodes)
+            if ((node.slab.features & slab_f90) != 0) node.slab.f0 *= node.slab.specular_weight;
+    }
     result.topology = Flattener(result.visible_tree, desc).run();
     return result;
 }

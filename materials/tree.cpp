@@ -33,6 +33,7 @@ constexpr std::array fields{
     NACRE_COLOR(albedo, 0, 0.0f, 1.0f),
     NACRE_NUMBER(anisotropy, slab_anisotropy, -1.0f, 1.0f),
     NACRE_COLOR(f90, slab_f90, 0.0f, 1.0f),
+    NACRE_NUMBER(specular_weight, slab_f90, 0.0f, 1.0f),
     NACRE_COLOR(f82, slab_f82, 0.0f, 1.0f),
     NACRE_NUMBER(second_roughness, slab_second_lobe, 0.0f, 1.0f),
     NACRE_NUMBER(second_weight, slab_second_lobe, 0.0f, 1.0f),

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "measure/numerical_error.h"
 #include "measure/texture_comparison.h"
 
 /// @file
@@ -30,5 +31,12 @@ struct ClosureDifference {
 /// Fields differ where their codes are more than one step apart; topologies where any place differs. Error:
 /// invalid_argument (sizes differ).
 Expected<ClosureDifference> compare_closures(const MaterialWords& reference, const MaterialWords& test);
+
+/// What single precision does to stored closures: for each kind of field that holds numbers one NumericalError of
+/// texture "material.slices", whose largest error has the name of the field ("f0.g"), the decoded values, and for
+/// `stored` the word in which the field begins. Pixels whose topologies differ show another surface: they count as flips
+/// of the first of the errors. Errors are in the field's unit, radians for normals and tangents, and of what goes round
+/// the shorter way. Error: invalid_argument (sizes differ).
+Expected<std::vector<NumericalError>> closure_errors(const MaterialWords& reference, const MaterialWords& test);
 
 }  // namespace nacre::measure

@@ -114,6 +114,7 @@ inline materials::Slab random_slab(Random& random, std::uint32_t allowed_feature
     slab.albedo = color();
     slab.anisotropy = unit() * (random() < 0.5 ? -1.0f : 1.0f);
     slab.f90 = color();
+    slab.specular_weight = unit();
     slab.f82 = color();
     slab.second_roughness = unit();
     slab.second_weight = unit();

@@ -152,8 +152,10 @@ void find_earlier_origin(const Contestant& reference, const Contestant& test, Wr
         at.stored = origin.value;
         bool is_found = false;
         for (const std::string& name : reads) {
-            const auto read = std::ranges::find(result.errors, name, &NumericalError::texture);
-            if (read == result.errors.end() || read->largest.error == 0.0) continue;
+            const bool is_wrong = std::ranges::any_of(result.errors, [&](const NumericalError& error) {
+                return error.texture == name && error.largest.error > 0.0;
+            });
+            if (!is_wrong) continue;
             NumericalError there{.texture = name, .largest = at};
             auto found = origin_of(reference, test, there, pass);
             if (!found) continue;
@@ -266,6 +268,10 @@ Expected<void> compare_all_textures(const Contestant& reference, const Contestan
         NACRE_TRY(const MaterialWords words_a, material_words_of(reference));
         NACRE_TRY(const MaterialWords words_b, material_words_of(test));
         NACRE_TRY(closures, compare_closures(words_a, words_b));
+        const bool is_wanted = options.only_texture.empty() || options.only_texture == "material.slices";
+        if (is_wanted && is_more_precise(reference, test)) {
+            NACRE_TRY(result.errors, closure_errors(words_a, words_b));
+        }
     }
     for (const IntermediateDescription& description : wanted) {
         if (!description.is_readable) continue;

@@ -21,16 +21,7 @@ class Sum {
 
     void add(std::uint32_t x, std::uint32_t y, const std::string& name, double reference, double value, double error,
              std::optional<double> stored = {}) {
-        if (!std::isfinite(reference) && !std::isfinite(value)) return;
-        if (!std::isfinite(error)) error = std::numeric_limits<double>::infinity();
-        const double magnitude = std::max(std::abs(reference), std::abs(value));
-        total_.rms = std::sqrt((total_.rms * total_.rms * static_cast<double>(total_.values) + error * error) /
-                               static_cast<double>(total_.values + 1));
-        ++total_.values;
-        if (std::isfinite(reference)) total_.largest_value = std::max(total_.largest_value, std::abs(reference));
-        if (magnitude > 0.0) total_.max_rel = std::max(total_.max_rel, error / magnitude);
-        if (error > total_.largest.error)
-            total_.largest = {x, y, layer_, mip_, name, reference, value, stored.value_or(value), error};
+        add_wrong_value(total_, {x, y, layer_, mip_, name, reference, value, stored.value_or(value), error});
     }
 
   private:
@@ -101,6 +92,18 @@ bool takes_over_absolute_errors(const std::string& operation) {
 }
 
 }  // namespace
+
+void add_wrong_value(NumericalError& sum, WrongValue value) {
+    if (!std::isfinite(value.reference) && !std::isfinite(value.value)) return;
+    if (!std::isfinite(value.error)) value.error = std::numeric_limits<double>::infinity();
+    const double magnitude = std::max(std::abs(value.reference), std::abs(value.value));
+    sum.rms = std::sqrt((sum.rms * sum.rms * static_cast<double>(sum.values) + value.error * value.error) /
+                        static_cast<double>(sum.values + 1));
+    ++sum.values;
+    if (std::isfinite(value.reference)) sum.largest_value = std::max(sum.largest_value, std::abs(value.reference));
+    if (magnitude > 0.0) sum.max_rel = std::max(sum.max_rel, value.error / magnitude);
+    if (value.error > sum.largest.error) sum.largest = std::move(value);
+}
 
 Expected<void> add_numerical_error(const TextureData& reference, const TextureData& test, std::span<const double> exact,
                                    std::uint32_t layer, std::uint32_t mip, NumericalError& sum) {

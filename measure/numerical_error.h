@@ -50,6 +50,9 @@ struct NumericalError {
 Expected<void> add_numerical_error(const TextureData& reference, const TextureData& test, std::span<const double> exact,
                                    std::uint32_t layer, std::uint32_t mip, NumericalError& sum);
 
+/// Adds one number to `sum`; what is finite in neither precision says nothing.
+void add_wrong_value(NumericalError& sum, WrongValue value);
+
 /// Where an error begins.
 struct ErrorOrigin {
     std::string shader, line;             ///< "file:line"; empty where the module does not know it.

@@ -34,6 +34,7 @@ Slab random_slab(std::mt19937& random, const RandomTreeDesc& desc) {
     slab.coverage = desc.is_lossless ? 1.0f : uniform(random) < 0.3f ? edgy(random) : 1.0f;
     slab.anisotropy = 2.0f * edgy(random) - 1.0f;
     slab.f90 = desc.is_lossless ? glm::vec3(1.0f) : color(random);
+    slab.specular_weight = edgy(random);
     slab.f82 = desc.is_lossless ? glm::vec3(1.0f) : color(random);
     slab.second_roughness = edgy(random);
     slab.second_weight = edgy(random);

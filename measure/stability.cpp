@@ -240,9 +240,10 @@ Expected<void> measure_furnaces(const StabilitySubject& subject, bool is_short, 
     return {};
 }
 
-// Samples of the device in single precision against the density of the host in double precision.
+// Samples of the device in single precision against the density of the host in double precision. first_sample: their
+// number among those of all tests, so that no two tests have random numbers in common.
 Expected<void> test_samplers(rhi::Device& device, const StabilitySubject& subject, std::uint64_t samples,
-                             bool is_short, double limit, StabilityClosure& row) {
+                             std::uint64_t first_sample, bool is_short, double limit, StabilityClosure& row) {
     if (subject.samplings.empty()) return {};
     row.has_sampler = true;
     StabilitySubject sampled = subject;
@@ -282,7 +283,7 @@ Expected<void> test_samplers(rhi::Device& device, const StabilitySubject& subjec
         double sum = 0.0, squares = 0.0;
         for (std::uint64_t done = 0; done < samples; done += batch_points) {
             const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(batch_points, samples - done));
-            point[subject.seed_word] = static_cast<std::uint32_t>(1000 * c + done / batch_points + 1);
+            point[subject.number_word] = static_cast<std::uint32_t>(first_sample + c / stride * samples + done);
             NACRE_CHECK(shader.run(std::span(point).first(subject.shader.point_words), {}, {}, count, results));
             for (std::uint32_t i = 0; i < count; ++i) {
                 const float* const s = &results[std::size_t{i} * 8];
@@ -404,30 +405,42 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
     std::ranges::move(trees, std::back_inserter(subjects));
     std::set<std::string> names;
     for (const StabilitySubject& subject : subjects) names.insert(subject.name);
-    std::erase_if(subjects, [&](const StabilitySubject& s) { return s.name.find(desc.only) == std::string::npos; });
-    if (subjects.empty()) {
+    const auto is_asked_for = [&](const StabilitySubject& s) { return s.name.find(desc.only) != std::string::npos; };
+    if (std::ranges::none_of(subjects, is_asked_for)) {
         return fail(ErrorCode::not_found, "measure stability", fmt::format("'{}'", desc.only),
                     "no closure's name contains it", fmt::format("Use a part of one of: {}.", fmt::join(names, ", ")));
     }
     double shares = 0.0;
-    std::size_t tests = 0;
+    std::size_t tests = 0, wanted = 0;
     // Furnaces and chi-square tests in full take some ten minutes, whatever the points.
     const bool is_short = desc.points < 50'000'000;
+    const auto tests_of = [&](const StabilitySubject& subject) {
+        return is_short ? (subject.samplings.size() + 4) / 5 : subject.samplings.size();
+    };
     for (const StabilitySubject& subject : subjects) {
-        shares += subject.share;
-        tests += is_short ? (subject.samplings.size() + 4) / 5 : subject.samplings.size();
+        tests += tests_of(subject);
+        if (is_asked_for(subject)) shares += subject.share, ++wanted;
     }
-    // Significance 0.01 over all tests together (Sidak), four sizes of bins in each.
+    // Significance 0.01 over all tests together (Sidak), four sizes of bins in each. Over those that are not asked for as
+    // well: a part of the sweep that is run again has the same samples and the same limit.
     const double limit = 1.0 - std::pow(0.99, 1.0 / (4.0 * static_cast<double>(std::max<std::size_t>(tests, 1))));
 
-    Progress progress("measuring closures", subjects.size());
+    Progress progress("measuring closures", wanted);
+    std::size_t done = 0;
+    std::uint64_t first_sample = 0;
     for (std::size_t s = 0; s < subjects.size(); ++s) {
         const StabilitySubject& subject = subjects[s];
-        progress.update(s, subject.name);
+        const std::uint64_t first = first_sample;
+        first_sample += tests_of(subject) * report.samples;
+        if (!is_asked_for(subject)) continue;
+        progress.update(done++, subject.name);
         auto row = std::ranges::find(report.closures, subject.name, &StabilityClosure::name);
         if (row == report.closures.end()) {
-            report.closures.push_back(
-                {.name = subject.name, .what = subject.what, .note = subject.note, .tolerance = subject.tolerance});
+            report.closures.push_back({.name = subject.name,
+                                       .what = subject.what,
+                                       .note = subject.note,
+                                       .tolerance = subject.tolerance,
+                                       .limits = subject.limits});
             row = report.closures.end() - 1;
             row->devices.resize(devices.size());
             for (std::size_t d = 0; d < devices.size(); ++d) row->devices[d].backend = desc.backends[d];
@@ -441,7 +454,7 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
             row->all.add(figures);
         }
         NACRE_CHECK(measure_furnaces(subject, is_short, *row));
-        NACRE_CHECK(test_samplers(*devices.front(), subject, report.samples, is_short, limit, *row));
+        NACRE_CHECK(test_samplers(*devices.front(), subject, report.samples, first, is_short, limit, *row));
     }
     report.seconds = seconds_since(start);
     return report;
@@ -459,6 +472,10 @@ std::vector<std::string> violations_of(const StabilityReport& report) {
         if (f.max_rel_error > c.tolerance)
             add(c, fmt::format("an error of {:.3g} where {:.3g} is allowed", f.max_rel_error, c.tolerance));
         if (f.closed_error > c.tolerance) add(c, fmt::format("off the closed form by {:.3g}", f.closed_error));
+        if (c.has_furnace && c.furnace_max > c.limits.furnace)
+            add(c, fmt::format("sends out {:.5f} of white light", c.furnace_max));
+        if (f.reciprocity > c.limits.reciprocity) add(c, fmt::format("two directions differ by {:.3g}", f.reciprocity));
+        if (f.weight_max > c.limits.weight) add(c, fmt::format("a sample's weight of {:.7g}", f.weight_max));
         if (f.agreement > 1e-4) add(c, fmt::format("sample, value and density differ by {:.3g}", f.agreement));
         // Fewer samples cannot tell a percent where most of them are lost below the surface.
         if (c.chi2_blind > 0 && report.samples >= 1'000'000)

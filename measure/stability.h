@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -26,7 +27,8 @@ struct StabilityDesc {
     /// Specs of the devices to measure. The first takes all points, the others a tenth.
     std::vector<std::string> backends{"cpu"};
     std::uint64_t points = 100'000'000;  ///< Of all closures together, at least 1,000.
-    std::string only;  ///< Closures whose name contains this; empty: all.
+    /// Closures whose name contains this; empty: all. What is measured of them is judged as a part of the whole.
+    std::string only;
 };
 
 /// How many of a sweep's trees, and samples of each chi-square test, so many points are worth.
@@ -57,10 +59,19 @@ struct StabilityFigures {
     void add(const StabilityFigures& other);
 };
 
+/// What a row promises besides small errors; infinite where it promises nothing.
+struct StabilityLimits {
+    static constexpr double none = std::numeric_limits<double>::infinity();
+    double furnace = 1.001;      ///< Energy under white light.
+    double reciprocity = none;   ///< Relative defect: of lobes that scatter once.
+    double weight = none;        ///< Of a sample: of lobes without compensation.
+};
+
 /// One closure's row.
 struct StabilityClosure {
     std::string name, what, note;
     double tolerance = 1e-3;
+    StabilityLimits limits;
     StabilityFigures all;                   ///< Of all devices together.
     std::vector<StabilityFigures> devices;  ///< In the order of the desc's backends.
     bool has_furnace = false, has_lossless = false, has_sampler = false;

@@ -4,7 +4,8 @@
 // SAMPLES (one slab and view for all invocations, sampled over and over).
 //
 // A point is a Slab as materials/slab.h orders its fields, view, light, three random numbers and the footprint; of
-// SAMPLES, the first of the random numbers is the bits of a seed.
+// SAMPLES, the first of the random numbers is the bits of the number of the first sample; samples of different numbers
+// have different random numbers.
 
 vec3 specular_lut(uint index, vec2 at) { return vec3(at.x, 1.0 - 0.5 * at.y, 0.5 + 0.5 * at.x * at.y); }
 
@@ -19,6 +20,7 @@ Slab next_slab() {
     slab.albedo = next3();
     float anisotropy = next();
     vec3 f90 = next3();
+    float specular_weight = next();
     vec3 f82 = next3();
     float second_roughness = next();
     float second_weight = next();
@@ -44,6 +46,7 @@ Slab next_slab() {
 #endif
 #ifdef NACRE_SLAB_F90
     slab.f90 = f90;
+    slab.specular_weight = specular_weight;
 #endif
 #ifdef NACRE_SLAB_F82
     slab.f82 = f82;
@@ -98,10 +101,10 @@ void main() {
     Slab slab = next_slab();
     vec3 view = next3();
     next3();
-    uint seed = points[place];
+    uint first = points[place];
     place += 3u;
     Closure closure = prepare_closure(slab, view, next());
-    uint x = hashed(gl_GlobalInvocationID.x ^ hashed(seed));
+    uint x = hashed(first + gl_GlobalInvocationID.x);
     uint y = hashed(x + 0x9e3779b9u);
     uint z = hashed(y + 0x7f4a7c15u);
     vec3 random = vec3(float(x >> 8u), float(y >> 8u), float(z >> 8u)) / 16777216.0;

@@ -215,7 +215,7 @@ ReportPage stability_page(const StabilityReport& report) {
                                c.all.max_rel_error > c.tolerance ? ReportTone::bad : ReportTone::good});
         if (c.has_furnace)
             furnace.bars.push_back({c.name, c.furnace_min, c.furnace_max,
-                                    c.furnace_max > 1.001 ? ReportTone::bad : ReportTone::good});
+                                    c.furnace_max > c.limits.furnace ? ReportTone::bad : ReportTone::good});
         ranked.push_back(&c);
     }
     std::ranges::stable_sort(ranked, std::greater{}, [](const StabilityClosure* c) { return c->all.max_rel_error; });

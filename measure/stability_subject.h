@@ -56,14 +56,16 @@ struct StabilitySubject {
     double share = 1.0;         ///< Of the sweep's points, relative to other subjects.
     bool counts_facets = false; ///< Results may jump where a count falls to the other side of a whole number.
     double tolerance = 1e-3;    ///< Relative error that is allowed; above 1e-3 only with a `note`.
+    StabilityLimits limits;
 
     std::function<void(Random&, std::uint32_t* words)> make_point;
     std::function<std::string(const std::uint32_t* words)> describe;
     /// Of view and light, the one nearer to the surface.
     std::function<double(const std::uint32_t* words)> lower_cosine;
-    /// A point of the shader's variant SAMPLES; `words[seed_word]` is to be set for each run.
+    /// A point of the shader's variant SAMPLES; `words[number_word]` is to be set for each run to the number of its first
+    /// sample.
     std::function<void(const materials::Slab&, const glm::dvec3& view, std::uint32_t* words)> make_sampling;
-    std::uint32_t seed_word = 0;
+    std::uint32_t number_word = 0;
     /// Parameters for a run; one set serves 64 points in a row.
     std::function<void(Random&, std::uint32_t sets, std::vector<float>&)> make_parameters;
     /// What formulae of other form give for the results, in double precision; NaN where there is none.

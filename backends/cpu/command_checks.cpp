@@ -40,6 +40,18 @@ void define_view(CheckedMemory& memory, const ImageView& view, bool stencil, boo
                      });
 }
 
+/// Whether anything of the view was ever written.
+bool has_defined(const CheckedMemory& memory, const ImageView& view, bool stencil) {
+    if (!memory.has_undefined()) return true;
+    bool found = false;
+    for_each_row(stencil ? view.stencil_levels[0] : view.levels[0], view, stencil ? 1 : view.texel_bytes,
+                 [&](std::byte* row, std::uint64_t bytes) {
+                     const auto offset = memory.offset_of(row);
+                     found = found || !offset || memory.has_defined(*offset, bytes);
+                 });
+    return found;
+}
+
 /// Makes the content of a view undefined, and as harmful as undefined content can be.
 void discard_view(CheckedMemory& memory, const ImageView& view, bool stencil) {
     define_view(memory, view, stencil, false);
@@ -76,24 +88,85 @@ void define_written(CheckedMemory& memory, const ImageView& view) {
 
 }  // namespace
 
+std::string Executor::place() const {
+    std::string text = fmt::format("list '{}'", plan_->lists.at(list_ - 1).name);
+    if (in_pass_ && !pass_name_.empty())
+        text += fmt::format(", pass '{}'", pass_name_);
+    else if (!debug_groups_.empty())
+        text += fmt::format(", '{}'", debug_groups_.back());
+    return text;
+}
+
 const CommandChecks* Executor::make_checks(const char* what, std::uint32_t number) {
     CommandChecks& checks = command_checks_.emplace_back();
     checks.flags = checks_.flags;
     checks.scope = scope_;
-    checks.command = fmt::format("{} {} of list '{}'", what, number, plan_->lists.at(list_ - 1).name);
-    if (in_pass_ && !pass_name_.empty())
-        checks.command += fmt::format(", pass '{}'", pass_name_);
-    else if (!debug_groups_.empty())
-        checks.command += fmt::format(", '{}'", debug_groups_.back());
+    checks.command = fmt::format("{} {} of {}", what, number, place());
     for (std::size_t i = 0; i < groups_.size(); ++i)
         if (groups_[i]) checks.objects[i] = &groups_[i]->checked;
     for (std::size_t i = 0; i < vertex_buffers_.size(); ++i)
         if (vertex_buffers_[i].buffer) checks.vertex_buffers[i] = vertex_buffers_[i].buffer->checked.get();
+    for (std::size_t i = 0; in_pass_ && i < std::min(targets_.colors.size(), checks.targets.size()); ++i) {
+        const ImageView& view = targets_.colors[i];
+        const auto known = std::ranges::find_if(attachments_, [&](const Attachment& attachment) {
+            return !attachment.is_depth && attachment.view.levels[0].data == view.levels[0].data;
+        });
+        if (view.levels[0].data && known != attachments_.end())
+            checks.targets[i] = {known->checked, view.levels[0], view.texel_bytes};
+    }
     checks.workgroup_memories = workgroup_check_pointers_;
     checks.batches = &batches_;
     checks.state = &watchdog_.state();
     checks.log = checks_.log;
     return &checks;
+}
+
+void Executor::add_undefined(const std::string& attempted, const std::string& subject, const std::string& expected,
+                             const std::string& found) {
+    checks_.log->add(rhi::ShaderFault::uninitialized_read, nullptr, attempted + subject, 1, false, [&] {
+        FoundFault fault;
+        fault.attempted = attempted;
+        fault.subject = subject;
+        fault.reason = fmt::format("expected {}, found {} that nothing has written", expected, found);
+        return fault;
+    });
+}
+
+bool Executor::are_undefined(const rhi::BufferReference& reference, std::uint64_t offset, std::uint64_t bytes,
+                             const char* what) {
+    const auto* const buffer = static_cast<const CpuBuffer*>(reference.object);
+    if (!(checks_.flags & (check_sanitize | check_hostile)) || !buffer->checked ||
+        !buffer->checked->is_undefined(offset, bytes))
+        return false;
+    add_undefined(fmt::format("{} indirectly", what), fmt::format("in {}", place()), "arguments that were written",
+                  fmt::format("some at byte {} of {}", offset, buffer->checked->name()));
+    return true;
+}
+
+void Executor::check_draw(const DrawCall& call, const CommandChecks& checks) {
+    if (call.indexed && index_buffer_->checked && index_buffer_->checked->has_undefined()) {
+        const std::uint64_t bytes = call.index_type == rhi::IndexType::uint16 ? 2 : 4;
+        const std::uint64_t end = std::min(std::uint64_t{call.first} + call.count, call.index_bytes / bytes);
+        for (std::uint64_t index = call.first; index < end; ++index) {
+            if (!index_buffer_->checked->is_undefined(index_offset_ + index * bytes, bytes)) continue;
+            add_undefined("run", checks.command, "indices that were written",
+                          fmt::format("index {} of {}", index, index_buffer_->checked->name()));
+            break;
+        }
+    }
+    const rhi::DepthStencilState& state = pipeline_->raster.depth_stencil;
+    const auto asks = [](rhi::CompareOperation operation) {
+        return operation != rhi::CompareOperation::always && operation != rhi::CompareOperation::never;
+    };
+    for (const Attachment& attachment : attachments_) {
+        if (attachment.loads_nothing && state.depth_test && asks(state.depth_compare))
+            add_undefined("test depth", fmt::format("in {}", place()), "depths that were written",
+                          fmt::format("some of {}", attachment.checked->name()));
+        const bool asks_stencil = state.stencil_test && (asks(state.front.compare) || asks(state.back.compare));
+        if (attachment.loads_no_stencil && asks_stencil)
+            add_undefined("test stencil", fmt::format("in {}", place()), "values that were written",
+                          fmt::format("some of {}", attachment.checked->name()));
+    }
 }
 
 void Executor::prepare_workgroup_checks() {
@@ -288,6 +361,10 @@ void Executor::note_transfer(const rhi::CommandHeader& header, const std::byte* 
 void Executor::note_pass_begin(const rhi::BeginRenderPassCommand& command) {
     begin_scope();
     attachments_.clear();
+    const bool follows_content = (checks_.flags & (check_sanitize | check_hostile)) != 0;
+    const auto is_unwritten = [](const Attachment& attachment, bool stencil) {
+        return !has_defined(*attachment.checked, attachment.view, stencil);
+    };
     for (std::uint32_t i = 0; i < command.color_count; ++i) {
         const rhi::ColorAttachmentCommand& color = command.colors()[i];
         if (!color.view.texture.object) continue;
@@ -298,6 +375,9 @@ void Executor::note_pass_begin(const rhi::BeginRenderPassCommand& command) {
         if (!attachment.checked) continue;
         if (color.load == rhi::LoadOperation::clear) define_view(*attachment.checked, attachment.view, false, true);
         if (color.load == rhi::LoadOperation::discard) discard_view(*attachment.checked, attachment.view, false);
+        if (color.load == rhi::LoadOperation::load && follows_content && is_unwritten(attachment, false))
+            add_undefined("begin render pass", fmt::format("in {}", place()), "content to load",
+                          fmt::format("all of {}", attachment.checked->name()));
         attachments_.push_back(attachment);
         if (!color.resolve.texture.object) continue;
         // All of a resolve target is written, whatever the samples hold.
@@ -319,6 +399,13 @@ void Executor::note_pass_begin(const rhi::BeginRenderPassCommand& command) {
         if (load == rhi::LoadOperation::clear) define_view(*attachment.checked, attachment.view, stencil, true);
         if (load == rhi::LoadOperation::discard) discard_view(*attachment.checked, attachment.view, stencil);
     };
+    const auto loads_nothing = [&](rhi::LoadOperation load, bool stencil) {
+        return follows_content && (load == rhi::LoadOperation::load || command.read_only) &&
+               is_unwritten(attachment, stencil);
+    };
+    const rhi::FormatInfo& format = rhi::info(attachment.view.format);
+    attachment.loads_nothing = format.has_depth && loads_nothing(command.depth_load, false);
+    attachment.loads_no_stencil = format.has_stencil && loads_nothing(command.stencil_load, true);
     begin_plane(command.depth_load, false);
     begin_plane(command.stencil_load, true);
     attachments_.push_back(attachment);

@@ -92,6 +92,15 @@ class Executor {
     // Checks (command_checks.cpp).
     /// What the shaders of a dispatch or draw are told; lives until `forget_checks`.
     const CommandChecks* make_checks(const char* what, std::uint32_t number);
+    /// Where the command stands: "list 'frame', pass 'lighting'".
+    [[nodiscard]] std::string place() const;
+    /// What a draw reads besides what its shaders do: indices, and the targets that its tests ask.
+    void check_draw(const DrawCall& call, const CommandChecks& checks);
+    /// Reports indirect arguments that nothing has written. What they would start could take any time: it is left out.
+    bool are_undefined(const rhi::BufferReference& reference, std::uint64_t offset, std::uint64_t bytes,
+                       const char* what);
+    void add_undefined(const std::string& attempted, const std::string& subject, const std::string& expected,
+                       const std::string& found);
     void begin_scope() { ++scope_, forget_checks(); }
     void forget_checks() { command_checks_.clear(); }
     void note_name(const rhi::CommandHeader& header, const std::byte* payload);
@@ -168,6 +177,7 @@ class Executor {
         ImageView view{};
         CheckedMemory* checked = nullptr;
         bool is_depth = false, is_discarded = false, is_stencil_discarded = false;
+        bool loads_nothing = false, loads_no_stencil = false;  ///< What is kept of it nothing has ever written.
     };
     std::vector<Attachment> attachments_;  ///< Of the open pass, where there are checks.
     /// Content that is kept from the commands of the open statement.

@@ -118,7 +118,7 @@ Expected<std::unique_ptr<rhi::BackendTexture>> CpuDevice::create_texture(const r
 }
 Expected<std::unique_ptr<rhi::BackendSampler>> CpuDevice::create_sampler(const rhi::SamplerDesc& desc) {
     NACRE_CHECK(check_lost("create sampler"));
-    return std::make_unique<CpuSampler>(desc, mode_ == ExecutionMode::consistent);
+    return std::make_unique<CpuSampler>(desc, mode_ != ExecutionMode::fast);
 }
 Expected<std::unique_ptr<rhi::BackendShader>> CpuDevice::create_shader(const rhi::ShaderDesc& desc,
                                                                        const rhi::ShaderReflection& reflection) {

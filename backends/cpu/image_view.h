@@ -36,6 +36,7 @@ enum class DirectTexels : std::uint32_t {
     no,
     float_word,    ///< r32_float, depth of 32 bits.
     integer_word,  ///< r32_uint, r32_sint
+    integer_pair,  ///< rg32_uint, rg32_sint
     half4,         ///< rgba16_float
     unorm8x4,      ///< rgba8_unorm
 };

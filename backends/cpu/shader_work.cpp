@@ -101,7 +101,14 @@ void Executor::draw(const DrawCall& call, std::uint32_t draw_index) {
     if (is_traced(state.pipeline->fragment.name))
         if (const RasterPipeline* traced = pipeline_->traced(*compiler_)) state.pipeline = traced;
     state.context = make_context();
-    if (checks_.flags) state.context.checks = make_checks("draw", ++draws_);
+    if (checks_.flags) {
+        const CommandChecks* const checks = make_checks("draw", ++draws_);
+        state.context.checks = checks;
+        if (checks_.flags & (check_sanitize | check_hostile)) {
+            state.check_blend = check_blend;
+            check_draw(call, *checks);
+        }
+    }
     for (std::size_t i = 0; i < vertex_buffers_.size(); ++i) {
         const VertexBuffer& bound = vertex_buffers_[i];
         const std::uint64_t size = bound.buffer ? bound.buffer->size_from(bound.offset) : 0;
@@ -152,24 +159,27 @@ void Executor::draw_indexed(const rhi::DrawIndexedArguments& arguments, std::uin
 
 void Executor::draw_indirect(const rhi::DrawIndirectCommand& command) {
     for (std::uint32_t i = 0; i < command.count && stopped_.empty(); ++i) {
-        const auto arguments =
-            read_arguments<rhi::DrawArguments>(command.arguments, command.offset + std::uint64_t{i} * command.stride);
+        const std::uint64_t offset = command.offset + std::uint64_t{i} * command.stride;
+        const auto arguments = read_arguments<rhi::DrawArguments>(command.arguments, offset);
         if (!arguments) return;
+        if (are_undefined(command.arguments, offset, sizeof *arguments, "draw")) continue;
         draw(*arguments, i);
     }
 }
 
 void Executor::draw_indexed_indirect(const rhi::DrawIndexedIndirectCommand& command) {
     for (std::uint32_t i = 0; i < command.count && stopped_.empty(); ++i) {
-        const auto arguments = read_arguments<rhi::DrawIndexedArguments>(
-            command.arguments, command.offset + std::uint64_t{i} * command.stride);
+        const std::uint64_t offset = command.offset + std::uint64_t{i} * command.stride;
+        const auto arguments = read_arguments<rhi::DrawIndexedArguments>(command.arguments, offset);
         if (!arguments) return;
+        if (are_undefined(command.arguments, offset, sizeof *arguments, "draw")) continue;
         draw_indexed(*arguments, i);
     }
 }
 
 void Executor::dispatch_indirect(const rhi::DispatchIndirectCommand& command) {
-    if (const auto arguments = read_arguments<rhi::DispatchArguments>(command.arguments, command.offset))
+    const auto arguments = read_arguments<rhi::DispatchArguments>(command.arguments, command.offset);
+    if (arguments && !are_undefined(command.arguments, command.offset, sizeof *arguments, "dispatch"))
         dispatch(*arguments);
 }
 

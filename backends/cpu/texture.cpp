@@ -19,6 +19,8 @@ DirectTexels direct_texels(rhi::Format format, std::uint64_t bytes) {
         case rhi::Format::d32_float_s8_uint: return DirectTexels::float_word;
         case rhi::Format::r32_uint:
         case rhi::Format::r32_sint: return DirectTexels::integer_word;
+        case rhi::Format::rg32_uint:
+        case rhi::Format::rg32_sint: return DirectTexels::integer_pair;
         case rhi::Format::rgba16_float: return DirectTexels::half4;
         case rhi::Format::rgba8_unorm: return DirectTexels::unorm8x4;
         default: return DirectTexels::no;

@@ -10,6 +10,7 @@
 #include "benchmarks/cpu/bench.h"
 #include "materials/single_slab.h"
 #include "passes/camera_block.h"
+#include "passes/geometry_draws.h"
 #include "passes/render_pass.h"
 #include "passes/scene_closures.h"
 #include "scene/builtin.h"

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -30,6 +31,13 @@ double load_average() {
     return getloadavg(loads, 1) == 1 ? loads[0] : 0.0;
 }
 
+/// Processor time of all threads of this process.
+double processor_ms() {
+    timespec time{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) * 1e3 + static_cast<double>(time.tv_nsec) * 1e-6;
+}
+
 }  // namespace
 
 Bench::Bench(Options options)
@@ -44,6 +52,7 @@ bool Bench::wants(const std::string& kind) const {
 }
 
 std::vector<std::uint32_t> Bench::lane_counts() const {
+    if (options_.lanes != 0) return {options_.lanes};
     return options_.quick ? std::vector<std::uint32_t>{16} : std::vector<std::uint32_t>{16, 8};
 }
 
@@ -76,18 +85,20 @@ Expected<void> Bench::measure(Case work) {
     if (!work.name.starts_with(options_.prefix) || work.cpu.empty() || work.references.empty()) return {};
     struct Measured {
         Side* side;
-        std::vector<double> times;
+        std::vector<double> times, processor_times;
     };
     // Every run on the CPU backend has a reference beside it: cpu, reference, cpu of fewer lanes, reference, ...
     std::vector<Measured> measured;
     for (std::size_t i = 0; i < std::max(work.cpu.size(), work.references.size()); ++i) {
-        if (i < work.cpu.size()) measured.push_back({&work.cpu[i], {}});
-        if (i < work.references.size()) measured.push_back({&work.references[i], {}});
+        if (i < work.cpu.size()) measured.push_back({&work.cpu[i], {}, {}});
+        if (i < work.references.size()) measured.push_back({&work.references[i], {}, {}});
     }
     std::string failure;
     for (std::uint32_t round = 0; round <= options_.rounds; ++round) {
         for (auto at = measured.begin(); at != measured.end();) {
+            const double processor_begin = processor_ms();
             const auto ms = at->side->run();
+            const double used_ms = processor_ms() - processor_begin;
             if (!ms) {
                 failure = ms.error().message();
                 skip(fmt::format("{} on {}", work.name, at->side->name), failure);
@@ -95,7 +106,7 @@ Expected<void> Bench::measure(Case work) {
                 continue;
             }
             // The first round pays for what is made at first use.
-            if (round > 0) at->times.push_back(*ms);
+            if (round > 0) at->times.push_back(*ms), at->processor_times.push_back(used_ms);
             ++at;
         }
     }
@@ -112,10 +123,13 @@ Expected<void> Bench::measure(Case work) {
                                 .reference_ms = std::ranges::min(reference.times),
                                 .cpu_median_ms = measure::median(cpu.times),
                                 .reference_median_ms = measure::median(reference.times),
+                                .cpu_processor_ms = measure::median(cpu.processor_times),
+                                .reference_processor_ms = measure::median(reference.processor_times),
                                 .target = cpu.side->lanes == 16 ? work.target : 0.0});
             const Result& result = results_.back();
-            fmt::print("{:<38} {:>2} lanes {:>9.2f} ms, {:<10} {:>9.2f} ms, ratio {:.2f}\n", result.name, result.lanes,
-                       result.cpu_ms, result.reference, result.reference_ms, result.ratio());
+            fmt::print("{:<38} {:>2} lanes {:>9.2f} ms, {:<10} {:>9.2f} ms, ratio {:.2f}, of processor time {:.2f}\n",
+                       result.name, result.lanes, result.cpu_ms, result.reference, result.reference_ms, result.ratio(),
+                       result.ratio_of_processor_time());
             std::fflush(stdout);
         }
     }
@@ -125,15 +139,52 @@ Expected<void> Bench::measure(Case work) {
 }
 
 std::string Bench::table() const {
-    std::string text = fmt::format("\n{:<38} {:>5} {:>10} {:<10} {:>10} {:>7} {:>8} {:>7}\n", "case", "lanes", "cpu ms",
-                                   "reference", "ms", "ratio", "(median)", "target");
+    std::string text = fmt::format("\n{:<38} {:>5} {:>10} {:<10} {:>10} {:>7} {:>8} {:>11} {:>7}\n", "case", "lanes",
+                                   "cpu ms", "reference", "ms", "ratio", "(median)", "(processor)", "target");
     for (const Result& result : results_) {
-        text += fmt::format("{:<38} {:>5} {:>10.2f} {:<10} {:>10.2f} {:>7.2f} {:>8.2f} {:>7}{}\n", result.name, result.lanes,
-                            result.cpu_ms, result.reference, result.reference_ms, result.ratio(),
-                            result.ratio_of_medians(), result.target > 0 ? fmt::format("{:.2f}", result.target) : "",
+        text += fmt::format("{:<38} {:>5} {:>10.2f} {:<10} {:>10.2f} {:>7.2f} {:>8.2f} {:>11.2f} {:>7}{}\n", result.name,
+                            result.lanes, result.cpu_ms, result.reference, result.reference_ms, result.ratio(),
+                            result.ratio_of_medians(), result.ratio_of_processor_time(),
+                            result.target > 0 ? fmt::format("{:.2f}", result.target) : "",
                             result.target > result.ratio() ? "  missed" : "");
     }
     for (const auto& [name, why] : skipped_) text += fmt::format("{}: skipped, {}\n", name, why);
+    return text;
+}
+
+std::string Bench::markdown() const {
+    struct Row {
+        std::string name, ours, references, ratios, processor_ratios, of_fewer_lanes;
+        double target = 0.0;
+    };
+    std::vector<Row> rows;
+    for (const Result& result : results_) {
+        if (rows.empty() || rows.back().name != result.name) rows.push_back({.name = result.name});
+        Row& row = rows.back();
+        const auto add = [](std::string& cell, const char* separator, const std::string& text) {
+            cell += (cell.empty() ? "" : separator) + text;
+        };
+        if (result.lanes != lane_counts().front()) {
+            add(row.of_fewer_lanes, " / ", fmt::format("{:.2f}", result.ratio()));
+            continue;
+        }
+        row.ours = fmt::format("{:.1f} ms", result.cpu_ms);
+        const std::string reference = result.reference == "vulkan" ? "lavapipe"
+                                      : result.reference == "gl"   ? "llvmpipe"
+                                                                   : result.reference;
+        add(row.references, ", ", fmt::format("{} {:.0f} ms", reference, result.reference_ms));
+        add(row.ratios, " / ", fmt::format("{:.2f}", result.ratio()));
+        add(row.processor_ratios, " / ", fmt::format("{:.2f}", result.ratio_of_processor_time()));
+        row.target = result.target;
+    }
+    std::string text = fmt::format(
+        "| case | {} lanes | reference | ratio | of processor time | ratio, fewer lanes | target |\n"
+        "|---|---|---|---|---|---|---|\n",
+        lane_counts().front());
+    for (const Row& row : rows)
+        text += fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", row.name, row.ours, row.references, row.ratios,
+                            row.processor_ratios, row.of_fewer_lanes,
+                            row.target > 0.0 ? fmt::format("{:g}", row.target) : "");
     return text;
 }
 
@@ -148,7 +199,10 @@ Expected<void> Bench::write_report(const std::string& folder) const {
                    {"lanes", result.lanes},
                    {"cpu_median_ms", result.cpu_median_ms},
                    {"reference_median_ms", result.reference_median_ms},
-                   {"ratio_of_medians", result.ratio_of_medians()}};
+                   {"ratio_of_medians", result.ratio_of_medians()},
+                   {"cpu_processor_ms", result.cpu_processor_ms},
+                   {"reference_processor_ms", result.reference_processor_ms},
+                   {"ratio_of_processor_time", result.ratio_of_processor_time()}};
         if (result.target > 0) {
             entry["target"] = result.target;
             entry["reached"] = result.ratio() >= result.target;
@@ -167,6 +221,7 @@ Expected<void> Bench::write_report(const std::string& folder) const {
                       {"devices", std::move(adapters)}};
     std::error_code problem;
     std::filesystem::create_directories(folder, problem);
+    NACRE_CHECK(write_file_atomically(folder + "/table.md", markdown()));
     return write_file_atomically(folder + "/report.json", report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

@@ -42,14 +42,18 @@ struct Result {
     std::uint32_t lanes = 0;
     double cpu_ms = 0.0, reference_ms = 0.0;                ///< Fastest rounds.
     double cpu_median_ms = 0.0, reference_median_ms = 0.0;
+    /// Processor time of all threads, user and system, which neighbors on the machine disturb less.
+    double cpu_processor_ms = 0.0, reference_processor_ms = 0.0;
     double target = 0.0;
     [[nodiscard]] double ratio() const { return reference_ms / cpu_ms; }
     [[nodiscard]] double ratio_of_medians() const { return reference_median_ms / cpu_median_ms; }
+    [[nodiscard]] double ratio_of_processor_time() const { return reference_processor_ms / cpu_processor_ms; }
 };
 
 struct Options {
     std::string prefix;           ///< Only cases that begin so.
     std::uint32_t rounds = 9;
+    std::uint32_t lanes = 0;      ///< Only this lane count; 0: all.
     bool quick = false;           ///< Few rounds, one lane count, few scenes: whether it runs at all.
     std::string assets;           ///< Folder of scenes; may not exist.
 };
@@ -81,7 +85,9 @@ class Bench {
     [[nodiscard]] const std::vector<Result>& results() const { return results_; }
     /// The table, for people.
     [[nodiscard]] std::string table() const;
-    /// Writes report.json below the folder. Errors: input_output.
+    /// The same in Markdown, a row for each case, as docs/cpu-performance.md has it.
+    [[nodiscard]] std::string markdown() const;
+    /// Writes report.json and table.md below the folder. Errors: input_output.
     Expected<void> write_report(const std::string& folder) const;
 
   private:

@@ -31,15 +31,25 @@ Slab blend_slabs(Slab a, Slab b, BlendShares shares) {
     slab.features = a.features | b.features;
     slab.coverage = shares.coverage;
     float t = blend_share(shares.first, shares.second);
-    slab.f0 = blend_color(a.f0, b.f0, shares.first_light, shares.second_light, shares.coverage);
-    vec3 entering_a = (vec3(1.0) - a.f0) * shares.first_light;
-    vec3 entering_b = (vec3(1.0) - b.f0) * shares.second_light;
+    // What the interfaces reflect along the normal.
+    vec3 f0_a = a.f0;
+    vec3 f0_b = b.f0;
+#ifdef NACRE_SLAB_F90
+    float weight_a = (a.features & slab_f90) != 0u ? a.specular_weight : 1.0;
+    float weight_b = (b.features & slab_f90) != 0u ? b.specular_weight : 1.0;
+    f0_a *= weight_a;
+    f0_b *= weight_b;
+#endif
+    vec3 f0 = blend_color(f0_a, f0_b, shares.first_light, shares.second_light, shares.coverage);
+    slab.f0 = f0;
+    vec3 entering_a = (vec3(1.0) - f0_a) * shares.first_light;
+    vec3 entering_b = (vec3(1.0) - f0_b) * shares.second_light;
     vec3 reflecting = a.albedo * entering_a + b.albedo * entering_b;
-    vec3 entering = (vec3(1.0) - slab.f0) * shares.coverage;
+    vec3 entering = (vec3(1.0) - f0) * shares.coverage;
     slab.albedo = vec3(blended_albedo(reflecting.x, entering.x), blended_albedo(reflecting.y, entering.y),
                        blended_albedo(reflecting.z, entering.z));
     // A bright lobe shows its shape more than a dim one.
-    float gloss = blend_share(shares.first * largest(a.f0), shares.second * largest(b.f0));
+    float gloss = blend_share(shares.first * largest(f0_a), shares.second * largest(f0_b));
     slab.roughness = mix(a.roughness, b.roughness, gloss);
 #ifdef NACRE_SLAB_ANISOTROPY
     slab.anisotropy = mix((a.features & slab_anisotropy) != 0u ? a.anisotropy : 0.0,
@@ -48,6 +58,9 @@ Slab blend_slabs(Slab a, Slab b, BlendShares shares) {
 #ifdef NACRE_SLAB_F90
     slab.f90 = mix((a.features & slab_f90) != 0u ? a.f90 : vec3(1.0),
                    (b.features & slab_f90) != 0u ? b.f90 : vec3(1.0), gloss);
+    slab.specular_weight = mix(weight_a, weight_b, t);
+    // Both together reflect what was blended.
+    if (slab.specular_weight > 0.0) slab.f0 = min(f0 / slab.specular_weight, vec3(1.0));
 #endif
 #ifdef NACRE_SLAB_F82
     slab.f82 = mix((a.features & slab_f82) != 0u ? a.f82 : vec3(1.0),

@@ -92,6 +92,45 @@ float charlie_visibility(float view_cosine, float light_cosine, float roughness,
     return 1.0 / max((1.0 + view_lambda + light_lambda) * 4.0 * view_cosine * light_cosine, 1e-9);
 }
 
+// What Charlie's fibers reflect of white light with Neubelt's visibility, for roughness from 0.1 on: a fit of the
+// quadrature, off by so little that a sheen over it keeps its energy within 0.0007.
+float charlie_albedo(float cos_theta, float roughness) {
+    float x = sqrt(saturated(cos_theta));
+    float y = 0.1 / clamp(roughness, 0.1, 1.0);
+    float c0 = 0.5028805 + y * (1.4734265 + y * (-1.4543716 + y * (1.6233663 + y * (-1.1155654 + y * 0.32539542))));
+    float c1 = -0.076725443 + y * (-0.33751558 + y * (0.24264197 + y * (-0.20233167 + y * (0.067974897 + y * -0.065709709))));
+    float c2 = -1.4393868 + y * (-9.326904 + y * (-1.7729892 + y * (-0.52072734 + y * (3.4307996 + y * -0.81865718))));
+    float c3 = 3.8562246 + y * (22.783004 + y * (12.257499 + y * (4.193818 + y * (-21.760096 + y * 5.9588272))));
+    float c4 = -5.158856 + y * (-31.195 + y * (-28.441983 + y * (8.4576412 + y * (28.518183 + y * -6.8614092))));
+    float c5 = 3.5472371 + y * (21.095494 + y * (35.835675 + y * (-34.028911 + y * (-1.4425976 + y * -1.8539448))));
+    float c6 = -0.99060585 + y * (-5.7568745 + y * (-13.599933 + y * (16.46029 + y * (-4.9851093 + y * 2.5779891))));
+    return c0 + x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * (c5 + x * c6)))));
+}
+
+// Charlie's lobe seen from one direction, over its own albedo: as published it reflects more than it gets where it is
+// smooth. Smoother ones than 0.1 are not fitted.
+struct CharlieLobe {
+    float view_cosine;
+    float half_exponent;
+    float scale;
+};
+
+CharlieLobe make_charlie_lobe(float view_cosine, float roughness) {
+    float exponent = 1.0 / clamp(roughness, 0.1, 1.0);
+    CharlieLobe lobe;
+    lobe.view_cosine = view_cosine;
+    lobe.half_exponent = 0.5 * exponent;
+    lobe.scale = (2.0 + exponent) * (0.125 * inverse_pi) / charlie_albedo(view_cosine, roughness);
+    return lobe;
+}
+
+// Value times the cosine of a light above the surface; integrates to 1. h: half vector of view and light.
+float charlie_value(CharlieLobe lobe, float light_cosine, vec3 h) {
+    float sin2 = clamp(h.x * h.x + h.y * h.y, 1e-9, 1.0);
+    float both = light_cosine + lobe.view_cosine - light_cosine * lobe.view_cosine;
+    return lobe.scale * pow(sin2, lobe.half_exponent) * light_cosine / max(both, 1e-7);
+}
+
 // Reflectance of what lies under a coat of index 1.5, a cubic fit of reflectance_under.
 float reflectance_under_coat_fit(float f0) {
     return saturated(f0 * (f0 * (0.941892 - 0.263008 * f0) + 0.346479) - 0.0285998);

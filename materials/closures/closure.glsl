@@ -54,6 +54,15 @@
 // towards the view only. Energy is kept exactly that way (up to the error of the tables), and nothing but the lobes is
 // computed for each light.
 
+// The shape of what fuzz reflects: 0 the mapped cosine lobe, 1 Charlie's. How much that is, is sheen_albedo either way.
+// A shader's choice of cost against error.
+#ifndef NACRE_FUZZ_MODEL
+#define NACRE_FUZZ_MODEL 0
+#endif
+#if defined(NACRE_SLAB_FUZZ) && NACRE_FUZZ_MODEL == 1
+#include "materials/closures/classic.glsl"
+#endif
+
 struct ClosureValue {
     vec3 specular;    // interface and fuzz
     vec3 diffuse;     // the medium, where the light entered
@@ -128,7 +137,11 @@ struct Closure {
 #endif
 #ifdef NACRE_SLAB_FUZZ
     vec3 fuzz;  // albedo
+#if NACRE_FUZZ_MODEL == 0
     SheenMap fuzz_map;
+#else
+    CharlieLobe fuzz_lobe;
+#endif
     float fuzz_probability;
 #endif
 #ifdef NACRE_SLAB_MEDIUM
@@ -259,7 +272,11 @@ Fresnel slab_fresnel(Slab slab) {
 #ifdef NACRE_SLAB_F82
     if ((slab.features & slab_f82) != 0u) f82 = slab.f82;
 #endif
-    return make_fresnel(slab.f0, f90, f82);
+    Fresnel fresnel = make_fresnel(slab.f0, f90, f82);
+#ifdef NACRE_SLAB_F90
+    if ((slab.features & slab_f90) != 0u) fresnel = scaled_fresnel(fresnel, vec3(slab.specular_weight));
+#endif
+    return fresnel;
 #endif
 }
 
@@ -463,7 +480,11 @@ Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprin
         float reflected = slab.fuzz_amount * sheen_albedo(min(closure.view.z, 1.0), slab.fuzz_roughness);
         uncovered = 1.0 - reflected;
         closure.fuzz = reflected * slab.fuzz_color;
+#if NACRE_FUZZ_MODEL == 0
         closure.fuzz_map = sheen_map(closure.view, slab.fuzz_roughness);
+#else
+        closure.fuzz_lobe = make_charlie_lobe(min(closure.view.z, 1.0), slab.fuzz_roughness);
+#endif
         closure.specular = scaled_lobe(closure.specular, vec3(uncovered));
 #ifdef NACRE_SLAB_SECOND_LOBE
         closure.second = scaled_lobe(closure.second, vec3(uncovered));
@@ -775,7 +796,18 @@ ClosureValue evaluate_closure_above(Closure closure, vec3 outside) {
         value.specular *= specular_tint(closure.specular_lut, closure.view.z, light.z);
 #endif
 #ifdef NACRE_SLAB_FUZZ
+#if NACRE_FUZZ_MODEL == 0
     if ((closure.features & slab_fuzz) != 0u) value.specular += closure.fuzz * sheen_density(closure.fuzz_map, outside);
+#else
+#ifdef NACRE_CLOSURE_COVERED
+    // Fuzz is no lobe below an interface: its lights are those outside.
+    vec3 fuzz_half = half_vector(closure.view, outside);
+#else
+    vec3 fuzz_half = h;
+#endif
+    if ((closure.features & slab_fuzz) != 0u)
+        value.specular += closure.fuzz * charlie_value(closure.fuzz_lobe, outside.z, fuzz_half);
+#endif
 #endif
     value.diffuse = closure.diffuse * diffuse_lobe(closure, light, half_cosine, h.z);
     float lambert = light.z * inverse_pi;
@@ -832,7 +864,12 @@ float closure_pdf(Closure closure, vec3 light) {
     }
 #endif
 #ifdef NACRE_SLAB_FUZZ
+#if NACRE_FUZZ_MODEL == 0
     if ((closure.features & slab_fuzz) != 0u) pdf += closure.fuzz_probability * sheen_density(closure.fuzz_map, light);
+#else
+    // Directions are uniform.
+    if ((closure.features & slab_fuzz) != 0u) pdf += closure.fuzz_probability * (0.5 * inverse_pi);
+#endif
 #endif
     return pdf + closure.diffuse_probability * light.z * inverse_pi;
 }
@@ -877,7 +914,11 @@ ClosureSample sample_closure(Closure closure, vec3 random) {
     if (!chosen && (closure.features & slab_fuzz) != 0u) {
         left -= closure.fuzz_probability;
         chosen = left < 0.0;
+#if NACRE_FUZZ_MODEL == 0
         if (chosen) result.direction = sheen_sample(closure.fuzz_map, random.y, random.z);
+#else
+        if (chosen) result.direction = uniform_direction(random.y, random.z);
+#endif
     }
 #endif
 #ifdef NACRE_SLAB_MEDIUM

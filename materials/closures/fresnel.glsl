@@ -15,12 +15,16 @@ struct Fresnel {
 // nothing at any angle, which Schlick's formula misses.
 const float smallest_reflectance = 0.02;
 
+// The color of a grazing reflection alone: its largest channel is 1. Black has none.
+vec3 grazing_tint(vec3 f90) {
+    float brightest = largest(f90);
+    return brightest > 0.0 ? f90 / brightest : vec3(1.0);
+}
+
 Fresnel make_fresnel(vec3 f0, vec3 f90, vec3 f82) {
     Fresnel fresnel;
     fresnel.normal = f0;
-    float brightest = largest(f90);
-    vec3 tint = brightest > 0.0 ? f90 / brightest : vec3(1.0);
-    fresnel.grazing = tint * saturated(largest(f0) * (1.0 / smallest_reflectance));
+    fresnel.grazing = grazing_tint(f90) * saturated(largest(f0) * (1.0 / smallest_reflectance));
     vec3 rise = fresnel.grazing - f0;
     // (6/7)^5 and 1 / ((1/7) (6/7)^6): the two terms where the dip is largest, at c = 1/7. The bound keeps the sum from
     // falling below 0 anywhere: 1 / (c (1 - c)^6) is at least 17.65, 1 / (c (1 - c)) at least 4. A hundredth is always

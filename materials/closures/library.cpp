@@ -25,9 +25,9 @@ Lobes::vec4 Library::interface_table(vec2 at) {
 Lobes::vec2 Library::anisotropy_table(vec4 at) {
     const auto words = materials::anisotropy_table();
     std::size_t lowest = 0, stride = 1;
-    std::size_t strides[4];
-    double part[4];
-    for (int axis = 0; axis < 4; ++axis) {
+    std::size_t strides[3];
+    double part[3];
+    for (int axis = 0; axis < 3; ++axis) {
         const double place = std::clamp(at[axis], 0.0, 1.0) * (anisotropy_table_size[axis] - 1);
         const int entry = std::min(static_cast<int>(place), static_cast<int>(anisotropy_table_size[axis]) - 2);
         part[axis] = place - entry;
@@ -35,16 +35,21 @@ Lobes::vec2 Library::anisotropy_table(vec4 at) {
         strides[axis] = stride;
         stride *= anisotropy_table_size[axis];
     }
+    const double w = std::clamp(at.w, 0.0, 1.0);
+    const double curve[3] = {(1.0 - w) * (1.0 - 2.0 * w), 4.0 * w * (1.0 - w), w * (2.0 * w - 1.0)};
     vec2 sum(0.0);
-    for (int corner = 0; corner < 16; ++corner) {
+    for (int corner = 0; corner < 8; ++corner) {
         double weight = 1.0;
         std::size_t entry = lowest;
-        for (int axis = 0; axis < 4; ++axis) {
+        for (int axis = 0; axis < 3; ++axis) {
             const bool is_upper = (corner >> axis & 1) != 0;
             weight *= is_upper ? part[axis] : 1.0 - part[axis];
             if (is_upper) entry += strides[axis];
         }
-        sum += weight * vec2(words[2 * entry], words[2 * entry + 1]) / 65535.0;
+        for (const double along : curve) {
+            sum += weight * along * vec2(words[2 * entry], words[2 * entry + 1]) / 65535.0;
+            entry += stride;
+        }
     }
     return sum;
 }
@@ -76,6 +81,7 @@ Library::Slab Library::slab_of(const materials::Slab& slab) {
         .albedo = slab.albedo,
         .anisotropy = slab.anisotropy,
         .f90 = slab.f90,
+        .specular_weight = slab.specular_weight,
         .f82 = slab.f82,
         .second_roughness = slab.second_roughness,
         .second_weight = slab.second_weight,

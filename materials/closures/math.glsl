@@ -47,4 +47,11 @@ vec3 cosine_direction(float random_x, float random_y) {
     return vec3(radius * cos(phi), radius * sin(phi), sqrt(1.0 - random_x));
 }
 
+// Density 1 / (2 pi).
+vec3 uniform_direction(float random_x, float random_y) {
+    float radius = sqrt(random_x * (2.0 - random_x));
+    float phi = 2.0 * pi * random_y;
+    return vec3(radius * cos(phi), radius * sin(phi), 1.0 - random_x);
+}
+
 #endif

@@ -15,6 +15,7 @@ struct Slab {
 #endif
 #ifdef NACRE_SLAB_F90
     vec3 f90;
+    float specular_weight;
 #endif
 #ifdef NACRE_SLAB_F82
     vec3 f82;

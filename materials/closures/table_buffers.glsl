@@ -43,16 +43,22 @@ vec2 medium_table(vec3 at) {
 
 #ifdef NACRE_SLAB_ANISOTROPY
 vec2 anisotropy_table(vec4 at) {
-    vec4 place = clamp(at, vec4(0.0), vec4(1.0)) * vec4(11.0, 9.0, 11.0, 10.0);
-    ivec4 entry = min(ivec4(place), ivec4(10, 8, 10, 9));
-    vec4 part = place - vec4(entry);
+    vec4 place = clamp(at, vec4(0.0), vec4(1.0));
+    vec3 scaled = vec3(place.x, place.y, place.z) * vec3(19.0, 17.0, 14.0);
+    ivec3 entry = min(ivec3(scaled), ivec3(18, 16, 13));
+    vec3 part = scaled - vec3(entry);
+    vec3 curve = vec3((1.0 - place.w) * (1.0 - 2.0 * place.w), 4.0 * place.w * (1.0 - place.w),
+                      place.w * (2.0 * place.w - 1.0));
     vec2 sum = vec2(0.0);
-    for (int corner = 0; corner < 16; ++corner) {
-        ivec4 offset = ivec4(corner & 1, corner >> 1 & 1, corner >> 2 & 1, corner >> 3);
-        vec4 weight = mix(vec4(1.0) - part, part, vec4(offset));
-        ivec4 index = entry + offset;
-        int word = ((index.w * 12 + index.z) * 10 + index.y) * 12 + index.x;
-        sum += weight.x * weight.y * weight.z * weight.w * unpackUnorm2x16(anisotropy_word(word));
+    for (int corner = 0; corner < 8; ++corner) {
+        ivec3 offset = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
+        vec3 weight = mix(vec3(1.0) - part, part, vec3(offset));
+        ivec3 index = entry + offset;
+        int word = (index.z * 18 + index.y) * 20 + index.x;
+        sum += weight.x * weight.y * weight.z *
+               (curve.x * unpackUnorm2x16(anisotropy_word(word)) +
+                curve.y * unpackUnorm2x16(anisotropy_word(word + 5400)) +
+                curve.z * unpackUnorm2x16(anisotropy_word(word + 10800)));
     }
     return sum;
 }

@@ -25,6 +25,10 @@ vec3 film_interference(float path) {
 // Below this the film fades: two orders of interference do not add up to the interface without it.
 const float thinnest_film = 3e-8;
 
+// What interference leaves at least of what it takes from: colors are wide bands, in which no path extinguishes all. Two
+// orders can come out at 0 or below, and what is left there would have but the digits that turns of a phase leave of it.
+const float least_left = 1.0 / 256.0;
+
 // Reflectance and 1 - reflectance, each with its digits where it is small.
 struct FilmShares {
     vec3 reflected;
@@ -36,7 +40,7 @@ struct FilmShares {
 float film_passed(float outer, float through, float inner, float inner_rest, float first_order, float second_order) {
     float amplitude = sqrt(outer * inner);
     float passed = through * inner_rest / max(1.0 - outer * inner, 1e-6);
-    return passed * (1.0 + 2.0 * amplitude * (first_order + amplitude * second_order));
+    return passed * max(1.0 + 2.0 * amplitude * (first_order + amplitude * second_order), least_left);
 }
 
 // The same for the reflectance: what cancels are numbers of its own size, where neither side reflects much. (Where
@@ -45,7 +49,19 @@ float film_reflected(float outer, float through, float inner, float inner_rest, 
                      float second_order) {
     float amplitude = sqrt(outer * inner);
     float interfering = 2.0 * through * inner_rest * amplitude * (first_order + amplitude * second_order);
-    return (outer * inner_rest + inner * through - interfering) / max(1.0 - outer * inner, 1e-6);
+    float both = outer * inner_rest + inner * through;
+    return max(both - interfering, least_left * both) / max(1.0 - outer * inner, 1e-6);
+}
+
+// What the medium below lets in as seen from the film, by its reflectance in air, and the rest of that. It reflects all
+// where the bare one does: from 0.98 on, where an index tells no more, both fade towards that. 1 - f0 is exact there;
+// the difference of two numbers of 50 would leave metals few digits of what they let in.
+float passed_below_film(float f0, float film_ior) {
+    float ior = reflectance_to_ior(f0);
+    return 4.0 * ior * film_ior / square(ior + film_ior) * saturated(50.0 * (1.0 - f0));
+}
+float reflected_below_film(float f0, float film_ior) {
+    return mix(1.0, reflectance_under(f0, film_ior), saturated(50.0 * (1.0 - f0)));
 }
 
 // Of the interface under a film, by the cosine to its normal. thickness: meters.
@@ -60,11 +76,9 @@ FilmShares film_shares(vec3 f0, float thickness, float film_ior, float cos_theta
     vec3 order_1 = film_interference(path);
     vec3 order_2 = film_interference(2.0 * path);
     float inside_rest = schlick_rest(inside, 1.0 - inside);
-    // Of the medium below as seen from the film: it reflects all where the bare one does.
-    vec3 below = vec3(mix(reflectance_under(f0.x, ior), 1.0, saturated(f0.x * 50.0 - 49.0)),
-                      mix(reflectance_under(f0.y, ior), 1.0, saturated(f0.y * 50.0 - 49.0)),
-                      mix(reflectance_under(f0.z, ior), 1.0, saturated(f0.z * 50.0 - 49.0)));
-    vec3 rest = (vec3(1.0) - below) * inside_rest;
+    vec3 below_rest = vec3(passed_below_film(f0.x, ior), passed_below_film(f0.y, ior), passed_below_film(f0.z, ior));
+    vec3 below = vec3(reflected_below_film(f0.x, ior), reflected_below_film(f0.y, ior), reflected_below_film(f0.z, ior));
+    vec3 rest = below_rest * inside_rest;
     vec3 inner = below * inside_rest + vec3(power5(1.0 - inside));
     // A reflection off a denser medium turns the phase by half a wave, off the film's upper side and, where what is
     // below is denser than the film, off its lower side: then both orders add up without a path.
@@ -92,10 +106,11 @@ Fresnel make_film_fresnel(Fresnel bare, float thickness, float film_ior, float c
     Fresnel fresnel = bare;
     fresnel.grazing = max(bare.grazing, vec3(saturated(ior_to_reflectance(max(film_ior, 1.0)) / smallest_reflectance)));
     float rest = schlick_rest(c, 1.0 - c);
-    vec3 bright = vec3(1.0) - clamp((film.passed - (vec3(1.0) - fresnel.grazing) * m5) / rest, vec3(0.0), vec3(1.0));
-    vec3 dark = clamp((film.reflected - fresnel.grazing * m5) / rest, vec3(0.0), vec3(1.0));
-    vec3 normal = vec3(film.passed.x < 0.5 ? bright.x : dark.x, film.passed.y < 0.5 ? bright.y : dark.y,
-                       film.passed.z < 0.5 ? bright.z : dark.z);
+    vec3 let_in = clamp((film.passed - (vec3(1.0) - fresnel.grazing) * m5) / rest, vec3(0.0), vec3(1.0));
+    // The curve's other end is subtracted: of what that leaves, least_left again.
+    vec3 dark = min(max((film.reflected - fresnel.grazing * m5) / rest, least_left * film.reflected), vec3(1.0));
+    vec3 normal = vec3(let_in.x < 0.5 ? 1.0 - let_in.x : dark.x, let_in.y < 0.5 ? 1.0 - let_in.y : dark.y,
+                       let_in.z < 0.5 ? 1.0 - let_in.z : dark.z);
     float share = smoothstep(0.0, thinnest_film, thickness);
     fresnel.normal = mix(bare.normal, normal, share);
     fresnel.grazing = mix(bare.grazing, fresnel.grazing, share);

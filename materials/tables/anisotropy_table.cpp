@@ -7,7 +7,7 @@ namespace {
 constexpr std::uint16_t table[] = {
 #include "materials/tables/anisotropy_table_data.inc"
 };
-static_assert(sizeof(table) == 2 * 2 * 12 * 10 * 12 * 11);
+static_assert(sizeof(table) == 2 * 2 * 20 * 18 * 15 * 3);
 
 }  // namespace
 

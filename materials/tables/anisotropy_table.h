@@ -5,28 +5,30 @@
 #include <span>
 
 /// @file
-/// Directional albedo of stretched GGX lobes: 12 x 10 x 12 x 11 entries of two 16-bit words (62 KiB), 65535 being 1.
-/// Values lie at the ends of all ranges. Let A be the larger of the two alphas, q the smaller one over it, phi the
-/// azimuth of the view from the axis of A, p = sqrt(A^2 cos^2 phi + (q A)^2 sin^2 phi) the alpha that the view sees.
-/// From the fastest axis on:
+/// Directional albedo of stretched GGX lobes: 20 x 18 x 15 x 3 entries of two 16-bit words (63 KiB), 65535 being 1.
+/// Values lie at the ends of all ranges. Let p be the alpha of the lobe's slopes in the plane of view and normal, o the
+/// alpha of those across it, r their correlation: the view's azimuth against the lobe's axes is in these three, and no
+/// function of them has to turn sharply where one axis is much smoother than the other. From the fastest axis on:
 ///
 /// axis | coordinate, 0 to 1
-/// 0    | sqrt(mu (1 + 3 p) / (mu + 3 p)), mu the cosine to the normal
-/// 1    | azimuth of the direction (cos phi, q^(1/4) sin phi), over a right angle
-/// 2    | q^(1/3), from its least (of a smaller alpha of 1e-4) to 1
-/// 3    | sqrt(A)
+/// 0    | 0.85 x^(3/4) + 0.15 mu, mu the cosine to the normal, x = sqrt(mu (1 + 3 p) / (mu + 3 p))
+/// 1    | p^(5/8)
+/// 2    | (sqrt(1 + 4 o^2) - 1) / (sqrt(5) - 1)
+/// 3    | r^2 (1 + r) / 2; a parabola goes through the three entries
+///
+/// Let E and s be what the round lobe of alpha p reflects, and its mean of (1 - c)^5 over the reflected light.
 ///
 /// word | content
-/// 0    | what is missing of all light with F = 1, as in materials/tables/interface_table.h
-/// 1    | 2 (mean of (1 - c)^5 over the reflected light - the same by interface_table() for alpha = p) + 1/4
+/// 0    | (1 - (what is reflected with F = 1) / E + 3/4) 4/5
+/// 1    | 2/3 (1 - (mean of (1 - c)^5)^(1/5)) / (1 - s^(1/5)) over the fit of it in materials/closures/tables.glsl
 ///
 /// Read by materials/closures/tables.glsl. Written by materials/tables/write_tables.cpp.
 
 namespace nacre::materials {
 
-inline constexpr std::uint32_t anisotropy_table_size[4] = {12, 10, 12, 11};
+inline constexpr std::uint32_t anisotropy_table_size[4] = {20, 18, 15, 3};
 
-/// 2 * 12 * 10 * 12 * 11 words.
+/// 2 * 20 * 18 * 15 * 3 words.
 [[nodiscard]] std::span<const std::uint16_t> anisotropy_table();
 
 }  // namespace nacre::materials

@@ -20,7 +20,8 @@ void main() {
     vec3 turned = vec3(c * direction.x - s * direction.z, direction.y, s * direction.x + c * direction.z);
     // At the poles the azimuth has no meaning, and atan no value.
     float azimuth = abs(turned.x) + abs(turned.z) > 1e-6 ? atan(turned.x, -turned.z) : 0.0;
-    vec2 uv = vec2(0.5 + azimuth / (2.0 * pi), acos(clamp(turned.y, -1.0, 1.0)) / pi);
+    // Near the poles the cosine has lost the angle, and arc cosines of drivers are off by up to 1.5e-4 (Mesa's).
+    vec2 uv = vec2(0.5 + azimuth / (2.0 * pi), atan(length(vec2(turned.x, turned.z)), turned.y) / pi);
     // A texel of the cube covers this many of the picture; explicit, since compute shaders have no derivatives.
     float lod = max(log2(float(textureSize(equirectangular, 0).x) / float(4 * size)), 0.0);
     vec3 light = textureLod(equirectangular, uv, lod).rgb * parameters.y;

@@ -14,7 +14,12 @@ void closure_words(vec3 to_viewer, float footprint, uvec2 pixel, out uint words[
     Slab slab = state.slabs[0];
     words[0] = pack_pixel_class(1u) | pack_occlusion(tree_occlusion()) | pack_diffuse_r(slab.albedo.r) |
                pack_diffuse_g(slab.albedo.g) | pack_diffuse_b(slab.albedo.b);
-    words[1] = pack_f0_r(slab.f0.r) | pack_f0_g(slab.f0.g) | pack_f0_b(slab.f0.b) | pack_f90(1.0);
+    float weight = 1.0;
+#ifdef NACRE_SLAB_F90
+    if ((slab.features & slab_f90) != 0u) weight = slab.specular_weight;
+#endif
+    words[1] = pack_f0_r(slab.f0.r * weight) | pack_f0_g(slab.f0.g * weight) | pack_f0_b(slab.f0.b * weight) |
+               pack_f90(weight);
     top_layer = pack_normal(frames.normals[0]) | pack_roughness(slab.roughness);
     subsurface = 0u;
 #else

@@ -97,6 +97,7 @@ Examples:
   nacre material --list
   nacre material coated-carbon -o coated-carbon.png
   nacre material my.json --profile mobile
+  nacre material --schema > material.schema.json    for editors: "$schema": "material.schema.json" in a file of yours
   nacre material car.gltf#paint -o paint.png
   nacre material complex-opal --budget 48 --json -
   nacre material dusty-car-paint --reference -o dusty.png    closures against brute force, with a ball of each
@@ -396,6 +397,7 @@ struct Definition {
         command->footer(material_footer);
         command->add_option("MATERIAL", material.material, "A built-in material, a .json file, or SCENE#NAME")->type_name("");
         command->add_flag("-l,--list", material.list, "List the built-in materials");
+        command->add_flag("--schema", material.schema, "Print the JSON schema of material files, for editors");
         command->add_flag("--full", material.full, "Simplify to one closure, as rays carry it");
         command
             ->add_option("-p,--profile", material.profile,

@@ -66,6 +66,7 @@ struct ExplainArguments {
 struct MaterialArguments {
     std::string material;             ///< A built-in name or a file; empty with `list`.
     bool list = false;
+    bool schema = false;              ///< Print the JSON schema of material files and do nothing else.
     bool full = false;                ///< Simplify to one closure, whatever the budget.
     std::string profile = "high";
     std::optional<std::uint32_t> budget;  ///< Bytes; empty: that of the profile.

@@ -34,7 +34,7 @@ std::string error_text(const measure::BackendResult& result) {
                                       ? fmt::format("{}, {}", at.x, at.y)
                                       : fmt::format("{}, {} layer {} mip {}", at.x, at.y, at.layer, at.mip);
         table.add({error.texture, figure_text(at.error), figure_text(error.share()), figure_text(error.max_rel),
-                   figure_text(error.rms), at.error > 0 ? place : "-", at.error > 0 ? at.name : "-",
+                   figure_text(error.rms), at.error > 0 ? place : "-", at.name.empty() ? "-" : at.name,
                    fmt::format("{:.9g}", at.reference), fmt::format("{:.9g}", at.value)});
     }
     std::string text = table.text();

@@ -223,6 +223,10 @@ Outcome list_materials(const std::string& json) {
 
 Outcome run(const MaterialArguments& arguments) {
     if (arguments.list) return list_materials(arguments.json);
+    if (arguments.schema) {
+        print_result({}, material_schema());
+        return ExitCode::success;
+    }
     if (arguments.material.empty()) {
         return wrong_usage({ErrorCode::invalid_argument, "look into a material", "MATERIAL", "it is not given",
                             "Write a name of `nacre material --list`, or a .json file."});

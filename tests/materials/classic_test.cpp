@@ -5,8 +5,31 @@
 #include "materials/tables/interface_table_generator.h"
 #include "tests/materials/closure_points.h"
 
+namespace nacre::materials::closures {
+
+/// The closures of a shader that defines NACRE_FUZZ_MODEL as 1, in double precision: Library has the other model.
+#undef NACRE_CLOSURES_CLOSURE
+#undef NACRE_CLOSURES_SLAB
+#undef NACRE_CLOSURES_TABLES
+#undef NACRE_FUZZ_MODEL
+#define NACRE_FUZZ_MODEL 1
+#define NACRE_SLAB_FUZZ 1
+struct CharlieLibrary : closures::Lobes {
+    static vec4 interface_table(vec2 at) { return Library::interface_table(at); }
+#define float double
+#define const static constexpr
+#include "materials/closures/closure.glsl"
+#undef const
+#undef float
+};
+#undef NACRE_SLAB_FUZZ
+
+}  // namespace nacre::materials::closures
+
 namespace nacre::materials::test {
 namespace {
+
+using closures::CharlieLibrary;
 
 /// Integral of D cos over the hemisphere of half vectors.
 template <typename Distribution>
@@ -53,6 +76,70 @@ TEST(Classic, CharlieReflectsMoreThanItGetsWhereItIsKnownTo) {
     }
     EXPECT_LT(largest, 1.0);
     std::printf("Charlie with its own visibility reflects at most %.3f, softened %.3f\n", largest, softened);
+}
+
+// Fuzz of Charlie's shape: as much as the other model reflects, whatever the roughness, so that what lies below gets
+// the same.
+TEST(Classic, CharlieOverItsAlbedoKeepsEnergy) {
+    CharlieLibrary library;
+    double smallest = 9.0, largest = 0.0;
+    for (const double fuzz_roughness : {0.0, 0.07, 0.1, 0.13, 0.2, 0.35, 0.6, 0.85, 1.0}) {
+        for (const double cosine : {1e-7, 1e-3, 0.02, 0.07, 0.15, 0.3, 0.55, 0.8, 1.0}) {
+            CharlieLibrary::Slab slab{.features = slab_fuzz,
+                                      .coverage = 1.0,
+                                      .f0 = glm::dvec3(0.04),
+                                      .roughness = 0.5,
+                                      .albedo = glm::dvec3(1.0),
+                                      .fuzz_amount = 1.0,
+                                      .fuzz_roughness = fuzz_roughness,
+                                      .fuzz_color = glm::dvec3(1.0)};
+            const glm::dvec3 view = direction(cosine, 0.4);
+            const auto closure = library.prepare_closure(slab, view, 1e-3);
+            const double whole = hemisphere_integral(128, [&](const glm::dvec3& light) {
+                const auto value = library.evaluate_closure(closure, light);
+                return value.specular.x + value.diffuse.x;
+            });
+            smallest = std::min(smallest, whole);
+            largest = std::max(largest, whole);
+            EXPECT_LE(whole, 1.001) << fuzz_roughness << " " << cosine;
+            EXPECT_GE(whole, 0.998) << fuzz_roughness << " " << cosine;
+        }
+    }
+    std::printf("white diffuse under Charlie's fuzz: %.4f to %.4f\n", smallest, largest);
+}
+
+TEST(Classic, SamplesOfCharlieAgreeWithValueAndDensity) {
+    CharlieLibrary library;
+    Random random(6);
+    double density = 0.0;
+    constexpr int count = 20000;
+    for (int i = 0; i < count; ++i) {
+        CharlieLibrary::Slab slab{.features = slab_fuzz,
+                                  .coverage = 1.0,
+                                  .f0 = glm::dvec3(random()),
+                                  .roughness = random(),
+                                  .albedo = glm::dvec3(random(), random(), random()),
+                                  .fuzz_amount = random(),
+                                  .fuzz_roughness = random(),
+                                  .fuzz_color = glm::dvec3(random(), random(), random())};
+        const auto closure = library.prepare_closure(slab, random_direction(random), 1e-3);
+        const auto sample = library.sample_closure(closure, {random(), random(), random()});
+        if (sample.pdf > 0.0 && !sample.is_mirror) {
+            ASSERT_NEAR(library.closure_pdf(closure, sample.direction) / sample.pdf, 1.0, 1e-9);
+            const auto value = library.evaluate_closure(closure, sample.direction);
+            for (int channel = 0; channel < 3; ++channel) {
+                const double all = value.specular[channel] + value.diffuse[channel];
+                ASSERT_TRUE(std::isfinite(all));
+                ASSERT_NEAR(all, sample.weight[channel] * sample.pdf, 1e-9 * all);
+            }
+        }
+        // Fuzz and diffuse alone: a light anywhere, of density 1 / (2 pi), weighs what the sampler makes of it.
+        slab.f0 = glm::dvec3(0.0);
+        const auto soft = library.prepare_closure(slab, direction(0.6, 0.0), 1e-3);
+        density +=
+            library.closure_pdf(soft, library.uniform_direction(random(), random())) * 2.0 * std::numbers::pi / count;
+    }
+    EXPECT_NEAR(density, 1.0, 0.02) << "four standard errors";
 }
 
 TEST(Classic, DiffuseModelsAgainstWhite) {

@@ -63,6 +63,7 @@ void main() {
     slab.albedo = next3();
     slab.anisotropy = next();
     slab.f90 = next3();
+    slab.specular_weight = next();
     slab.f82 = next3();
     slab.second_roughness = next();
     slab.second_weight = next();

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -43,6 +44,35 @@ TEST(DescriptionTree, MetalAndDielectric) {
     const ShadedTree shaded = shade(between, {0.0, 0.0, 1.0});
     EXPECT_NEAR(shaded.closures[0].slab.f0.x, 0.5 * (0.04 + 0.8), 1e-6);
     EXPECT_NEAR(shaded.closures[0].slab.albedo.x, 0.5 * 0.8 * (1.0 - 0.04) / (1.0 - 0.5 * (0.04 + 0.8)), 1e-6);
+}
+
+// KHR_materials_specular: the color tints F0, the factor and its texture scale the whole curve.
+TEST(DescriptionTree, SpecularIsAWeightWithATexture) {
+    MaterialDescription material{.name = "satin"};
+    material.metallic = 0.0f;
+    material.specular = Specular{.factor = 0.5f, .color = {1.0f, 0.5f, 30.0f}};
+    const FlattenedTree plain = flat(material);
+    EXPECT_NEAR(only_slab(plain).f0.y, 0.02f, 1e-6f);
+    EXPECT_EQ(only_slab(plain).f0.z, 1.0f) << "what is above 1 is cut before it is scaled";
+    EXPECT_EQ(only_slab(plain).specular_weight, 0.5f);
+    material.specular = Specular{.factor = 1.0f};
+    EXPECT_EQ(only_slab(flat(material)).features, 0u) << "a whole interface is one without features";
+    material.specular->texture = {.image = 3, .sampler = 0};
+    material.specular->color_texture = {.image = 4, .sampler = 0};
+    const Tree tree = tree_of(material);
+    const auto texture = [&](std::string_view field) {
+        const auto& textures = tree.nodes[tree.root].textures;
+        const auto found = std::ranges::find(textures, field, &TextureInput::field);
+        return found == textures.end() ? TextureInput{} : *found;
+    };
+    EXPECT_EQ(texture("specular_weight").texture.image, 3);
+    EXPECT_EQ(texture("specular_weight").channel, 3u);
+    EXPECT_EQ(texture("f0").texture.image, 4);
+    // Without the feature, F0 keeps the factor.
+    material.specular = Specular{.factor = 0.5f};
+    const auto dropped = flatten(tree_of(material), {.dropped_features = slab_f90});
+    ASSERT_TRUE(dropped);
+    EXPECT_NEAR(only_slab(*dropped).f0.x, 0.02f, 1e-6f);
 }
 
 // Both widths of the lobe are those of glTF's definition, alpha_t = mix(alpha, 1, strength^2) and alpha_b = alpha.

@@ -162,6 +162,23 @@ TEST(Storage, MaterialsComeBack) {
     EXPECT_LE(worst, 1.0 / 127);
 }
 
+// The brightness of F90, which closures do without, holds the weight; a white one has its place in a plain slab.
+TEST(Storage, SpecularWeightsComeBack) {
+    Tree tree;
+    tree.root = tree.add(Slab{.features = slab_f90 | slab_fuzz, .f90 = {0.1f, 0.2f, 0.05f}, .specular_weight = 0.36f});
+    const auto flat = flatten(tree);
+    ASSERT_TRUE(flat);
+    const auto back = unpack_pixel(pack_pixel(storage_layout(*flat), shade(*flat, {0, 0, 1}), {}));
+    ASSERT_TRUE(back);
+    const Library::Slab& slab = back->closures[0].slab;
+    EXPECT_NEAR(std::sqrt(slab.specular_weight), 0.6, 1.0 / 127);
+    EXPECT_NEAR(slab.f90.r / slab.f90.g, 0.5, 0.03) << "the color stays";
+    tree.nodes[tree.root].slab = {.features = slab_f90, .specular_weight = 0.36f};
+    EXPECT_EQ(storage_layout(*flatten(tree)).storage_class, StorageClass::simple);
+    tree.nodes[tree.root].slab.f90 = {1.0f, 0.9f, 0.9f};
+    EXPECT_EQ(storage_layout(*flatten(tree)).storage_class, StorageClass::single);
+}
+
 TEST(Storage, ATruncatedPixelIsAnError) {
     for (const FlattenedTree& flat : storable_trees(10)) {
         StoredPixel pixel = pack_pixel(storage_layout(flat), shade(flat, {0, 0, 1}), {});

@@ -241,7 +241,8 @@ TEST(TreeJson, TheSchemaInTheTreeIsTheOneOfTheFormat) {
     std::ifstream stream(NACRE_SOURCE_DIR "/materials/material.schema.json");
     std::stringstream text;
     text << stream.rdbuf();
-    EXPECT_EQ(text.str(), material_schema()) << "write it anew: materials/material.schema.json";
+    EXPECT_EQ(text.str(), material_schema())
+        << "write it anew: nacre material --schema > materials/material.schema.json";
     const auto schema = nlohmann::json::parse(material_schema());
     EXPECT_TRUE(schema["$defs"]["texture"]["required"].is_array());
     const auto& slab = schema["$defs"]["node"]["oneOf"][0]["properties"]["slab"]["properties"];

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "materials/builtin_materials.h"
@@ -81,6 +83,61 @@ TEST_F(ClosureComparison, AnotherTopologyIsADifference) {
     const auto result = compare_closures(words_of(pixel_), words_of(with(StorageValue::features, 1)));
     ASSERT_TRUE(result);
     EXPECT_EQ(result->difference.fields_differing, 1u);
+}
+
+const NumericalError& error_of(const std::vector<NumericalError>& errors, std::string_view field) {
+    const auto found = std::ranges::find_if(errors, [&](const auto& error) { return error.largest.name == field; });
+    EXPECT_NE(found, errors.end()) << field;
+    return *found;
+}
+
+TEST_F(ClosureComparison, ErrorsAreThoseOfTheDecodedFields) {
+    const auto same = closure_errors(words_of(pixel_), words_of(pixel_));
+    ASSERT_TRUE(same) << same.error().message();
+    for (const NumericalError& error : *same) {
+        EXPECT_EQ(error.texture, "material.slices");
+        EXPECT_FALSE(error.largest.name.empty()) << "the field is named, right or wrong";
+        EXPECT_EQ(error.largest.error, 0.0) << error.largest.name;
+        EXPECT_GT(error.values, 0u);
+    }
+    // Two codes of red, whose square root is stored in 7 bits.
+    const UnpackedMaterial before = *unpack_pixel(pixel_), after = *unpack_pixel(with(StorageValue::f0, 2));
+    const double red = before.closures[0].slab.f0.r, wrong = after.closures[0].slab.f0.r;
+    ASSERT_NEAR(std::sqrt(wrong) - std::sqrt(red), 2.0 / 127, 1e-12);
+    const auto errors = closure_errors(words_of(pixel_), words_of(with(StorageValue::f0, 2)));
+    ASSERT_TRUE(errors);
+    for (const NumericalError& error : *errors)
+        EXPECT_EQ(error.largest.error > 0.0, error.largest.name == "f0.r") << error.largest.name;
+    const WrongValue& found = error_of(*errors, "f0.r").largest;
+    EXPECT_DOUBLE_EQ(found.reference, red);
+    EXPECT_DOUBLE_EQ(found.value, wrong);
+    EXPECT_DOUBLE_EQ(found.error, wrong - red);
+    // Numbers on a scale of their own: 1 / 255 for each code.
+    const auto weight = closure_errors(words_of(pixel_), words_of(with(StorageValue::roughness, 3)));
+    ASSERT_TRUE(weight);
+    EXPECT_NEAR(error_of(*weight, "roughness").largest.error, 3.0 / 255, 1e-12);
+}
+
+TEST_F(ClosureComparison, OtherTopologiesAreNoErrorsOfValues) {
+    const auto both = [](const StoredPixel& first, const StoredPixel& second) {
+        MaterialWords words = words_of(first);
+        const MaterialWords more = words_of(second);
+        const auto append = [](TextureData& to, const TextureData& from) {
+            to.bytes.insert(to.bytes.end(), from.bytes.begin(), from.bytes.end());
+            to.width = 2;
+        };
+        append(words.material_0, more.material_0);
+        append(words.material_1, more.material_1);
+        for (std::size_t i = 0; i < words.slices.size(); ++i) append(words.slices[i], more.slices[i]);
+        return words;
+    };
+    const auto errors =
+        closure_errors(both(pixel_, pixel_), both(with(StorageValue::features, 1), with(StorageValue::f0, 2)));
+    ASSERT_TRUE(errors);
+    std::uint64_t flips = 0;
+    for (const NumericalError& error : *errors) flips += error.flips;
+    EXPECT_EQ(flips, 1u);
+    EXPECT_EQ(error_of(*errors, "f0.r").largest.x, 1u);
 }
 
 TEST_F(ClosureComparison, PixelsOfOtherClassesAreNotLookedAt) {

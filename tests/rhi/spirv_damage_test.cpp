@@ -3,10 +3,10 @@
 #include "rhi/spirv.h"
 
 #include <gmock/gmock.h>
-#include <spirv-tools/libspirv.hpp>
 
 #include <random>
 
+#include "tests/rhi/assembly.h"
 #include "tests/rhi/shader_text.h"
 
 namespace nacre::rhi {
@@ -47,14 +47,9 @@ std::string error_of(const std::vector<std::uint32_t>& words) {
 
 /// From SPIR-V assembly, so that modules which GLSL cannot say can be made.
 std::vector<std::uint32_t> assemble(const std::string& text, spv_target_env environment = SPV_ENV_UNIVERSAL_1_3) {
-    spvtools::SpirvTools tools(environment);
-    std::string log;
-    tools.SetMessageConsumer([&](spv_message_level_t, const char*, const spv_position_t& at, const char* message) {
-        log += std::to_string(at.line) + ": " + message + "\n";
-    });
-    std::vector<std::uint32_t> words;
-    EXPECT_TRUE(tools.Assemble(text, &words, SPV_TEXT_TO_BINARY_OPTION_PRESERVE_NUMERIC_IDS)) << log;
-    return words;
+    auto words = test::assemble(text, environment);
+    EXPECT_TRUE(words) << words.error().message();
+    return words ? *std::move(words) : std::vector<std::uint32_t>{};
 }
 
 TEST(SpirvDamage, TheGoodModuleIsGood) { EXPECT_TRUE(try_reflect(good_shader().spirv)); }

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "core/image.h"
 #include "tests/core/temporary_folder.h"
@@ -87,6 +88,14 @@ TEST(MaterialCommand, ListsBuiltInMaterialsAndReadsFiles) {
     EXPECT_EQ(result.exit_code, 0) << result.errors;
     EXPECT_THAT(result.output, HasSubstr("fuzz"));
     EXPECT_THAT(run_nacre({"material", "builtin:spheres#no such"}).errors, HasSubstr("Use one of"));
+}
+
+TEST(MaterialCommand, PrintsTheSchemaThatIsInTheTree) {
+    std::stringstream in_tree;
+    in_tree << std::ifstream(NACRE_SOURCE_DIR "/materials/material.schema.json").rdbuf();
+    const CommandResult result = run_nacre({"material", "--schema"});
+    ASSERT_EQ(result.exit_code, 0) << result.errors;
+    EXPECT_EQ(result.output, in_tree.str());
 }
 
 // Seen and lit along the normal, GGX reflects F / (4 pi alpha^2), and next to nothing more by multiple scattering.

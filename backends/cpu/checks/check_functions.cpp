@@ -212,6 +212,10 @@ std::uint32_t memory(RunningInvocations* running, const CheckSite* site, const D
     return read_undefined;
 }
 
+void input(RunningInvocations* running, const CheckSite* site, std::uint32_t lanes) {
+    note_undefined(*running, *site, nullptr, lanes);
+}
+
 // ---- Images -----------------------------------------------------------------------------------------------------
 
 struct TexelPlace {
@@ -326,11 +330,39 @@ std::uint32_t image(RunningInvocations* running, const CheckSite* site, const De
 
 }  // namespace
 
+void check_blend(const CommandChecks* checks, const BlendedTexels& texels) {
+    const CommandChecks::Target& target = checks->targets[texels.target];
+    if (!target.memory || target.texel_bytes < 4 || !target.memory->has_undefined()) return;
+    for (std::uint32_t rest = texels.lanes; rest != 0; rest &= rest - 1) {
+        const auto lane = static_cast<std::uint32_t>(std::countr_zero(rest));
+        const auto x = static_cast<std::uint32_t>(texels.x[lane / 4]) + (lane & 1),
+                   y = static_cast<std::uint32_t>(texels.y[lane / 4]) + (lane >> 1 & 1);
+        const auto offset = target.memory->offset_of(
+            target.level.data + texels.sample * target.level.sample_stride +
+            std::uint64_t{y} * target.level.row_stride + std::uint64_t{x} * target.texel_bytes);
+        if (!offset || !target.memory->is_undefined(*offset, target.texel_bytes)) continue;
+        // What the pass has written so far is known at its end only: until then by what it is no more.
+        bool is_poison = true;
+        for (std::uint32_t word = 0; word < target.texel_bytes / 4; ++word)
+            is_poison = is_poison && texels.words[word][lane] == poison_word(*offset / 4 + word);
+        if (!is_poison) continue;
+        const std::string object = checks->command + target.memory->name();
+        checks->log->add(ShaderFault::uninitialized_read, nullptr, object, 1, false, [&] {
+            FoundFault fault;
+            fault.attempted = "blend";
+            fault.subject = fmt::format("with {}, {}, pixel ({}, {})", target.memory->name(), checks->command, x, y);
+            fault.reason = "expected a texel that was written, found one that was not";
+            return fault;
+        });
+    }
+}
+
 NacreCpuCheckBegin check_begin_function() { return begin; }
 NacreCpuCheckWorkgroup check_workgroup_function() { return begin_workgroup; }
 NacreCpuCheckFault check_fault_function() { return fault; }
 NacreCpuCheckMemory check_memory_function() { return memory; }
 NacreCpuCheckImage check_image_function() { return image; }
+NacreCpuCheckInput check_input_function() { return input; }
 
 std::uint32_t poison_word(std::uint64_t index) {
     // 0x7f8..., 0x7fa...: infinities no, numbers neither; the lower bits differ from word to word.

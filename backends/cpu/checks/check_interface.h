@@ -56,6 +56,16 @@ enum MemoryAccess : std::uint32_t {
 /// Beside ImageFlags: invocations agree on their own who uses a texel when.
 inline constexpr std::uint32_t image_unshared = 1u << 31;
 
+/// Texels of a color target that blending is about to read, in sixteen lanes.
+struct BlendedTexels {
+    std::uint32_t target;  ///< Number of the color target in its pass.
+    std::uint32_t sample;
+    const std::int32_t *x, *y;            ///< Left upper pixel of each quad of lanes, as in FragmentBatch.
+    const std::uint32_t (*words)[max_lanes];  ///< For each 32-bit word of a texel those of all lanes.
+    std::uint32_t lanes;                  ///< One bit for each that counts.
+};
+using BlendCheck = void (*)(const CommandChecks*, const BlendedTexels&);
+
 }  // namespace nacre::cpu
 
 // Functions that checked code calls. `lanes` has one bit for each lane that counts. Arrays have max_lanes elements.
@@ -73,6 +83,8 @@ using NacreCpuCheckMemory = std::uint32_t (*)(nacre::cpu::RunningInvocations*, c
                                               const nacre::cpu::Descriptor* const* descriptors,
                                               std::byte* const* addresses, std::uint32_t bytes, std::uint32_t access,
                                               std::uint32_t lanes, std::uint32_t undefined);
+/// A read of an input of a fragment shader that is undefined in these lanes.
+using NacreCpuCheckInput = void (*)(nacre::cpu::RunningInvocations*, const nacre::cpu::CheckSite*, std::uint32_t lanes);
 /// An access to an image, before it is made; returns the lanes that read what is undefined.
 using NacreCpuCheckImage = std::uint32_t (*)(nacre::cpu::RunningInvocations*, const nacre::cpu::CheckSite*,
                                              const nacre::cpu::Descriptor* image, const nacre::cpu::Descriptor* sampler,

@@ -47,13 +47,13 @@ CheckedMemory::CheckedMemory(std::string name, std::byte* data, std::uint64_t si
     undefined_.assign((size + 63) / 64, is_defined ? 0 : ~std::uint64_t{0});
 }
 
-bool CheckedMemory::is_undefined(std::uint64_t offset, std::uint64_t bytes) const {
-    if (!has_undefined()) return false;
+bool CheckedMemory::holds(std::uint64_t offset, std::uint64_t bytes, bool undefined) const {
+    const std::uint64_t turned = undefined ? 0 : ~std::uint64_t{0};
     for (std::uint64_t at = offset; at < offset + bytes && at < size_;) {
         const std::uint64_t first = at % 64, count = std::min(64 - first, offset + bytes - at);
         const std::uint64_t mask = (count == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1) << first;
-        if (std::atomic_ref(const_cast<std::uint64_t&>(undefined_[at / 64])).load(std::memory_order_relaxed) & mask)
-            return true;
+        const std::atomic_ref bits(const_cast<std::uint64_t&>(undefined_[at / 64]));
+        if ((bits.load(std::memory_order_relaxed) ^ turned) & mask) return true;
         at += count;
     }
     return false;

@@ -56,7 +56,13 @@ class CheckedMemory {
         return static_cast<std::uint64_t>(address - data_);
     }
     /// Some of the bytes were never written.
-    [[nodiscard]] bool is_undefined(std::uint64_t offset, std::uint64_t bytes) const;
+    [[nodiscard]] bool is_undefined(std::uint64_t offset, std::uint64_t bytes) const {
+        return has_undefined() && holds(offset, bytes, true);
+    }
+    /// Some of the bytes were written.
+    [[nodiscard]] bool has_defined(std::uint64_t offset, std::uint64_t bytes) const {
+        return !has_undefined() || holds(offset, bytes, false);
+    }
     void define(std::uint64_t offset, std::uint64_t bytes, bool is_defined = true);
     /// Whether any byte may be undefined; cheap.
     [[nodiscard]] bool has_undefined() const { return has_undefined_.load(std::memory_order_relaxed); }
@@ -82,6 +88,8 @@ class CheckedMemory {
         void operator()(Word* words) const;
     };
     [[nodiscard]] Word* words();
+    /// Whether any of the bytes is undefined, or any is not.
+    [[nodiscard]] bool holds(std::uint64_t offset, std::uint64_t bytes, bool undefined) const;
 
     const std::string name_;
     std::byte* const data_;

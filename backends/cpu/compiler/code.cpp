@@ -287,6 +287,7 @@ class OrcGenerator final : public CodeGenerator {
         define("nacre_cpu_check_fault", check_fault_function());
         define("nacre_cpu_check_memory", check_memory_function());
         define("nacre_cpu_check_image", check_image_function());
+        define("nacre_cpu_check_input", check_input_function());
         define("nacre_cpu_ray_proceed", ray_proceed_function());
         define("nacre_cpu_ray_confirm", ray_confirm_function());
         define("nacre_cpu_ray_generate", ray_generate_function());

@@ -25,6 +25,7 @@ struct Emitter::CheckNotes {
     std::unordered_map<Id, std::uint32_t> last_store;  ///< Offset of the last store to a variable.
     std::unordered_map<std::string, llvm::Constant*> sites;
     std::unordered_map<const Function*, std::unordered_map<Id, const Instruction*>> definitions;
+    rhi::ShaderStage stage = rhi::ShaderStage::compute;
     llvm::AllocaInst *running = nullptr, *found = nullptr, *limit = nullptr, *descriptors = nullptr,
                      *addresses = nullptr;
 };
@@ -118,6 +119,7 @@ llvm::Value* Emitter::check_site(const std::string& object, std::int32_t set, st
 
 void Emitter::begin_checks(rhi::ShaderStage stage, llvm::Value* work, llvm::Value* group_x, llvm::Value* subgroup) {
     CheckNotes& all = notes();
+    all.stage = stage;
     llvm::Type* word = builder.getInt32Ty();
     llvm::Type* wide = builder.getInt64Ty();
     if (!all.running) all.running = make_slot(llvm::ArrayType::get(wide, sizeof(RunningInvocations) / 8), "running");
@@ -371,16 +373,20 @@ void Emitter::check_quads() {
 
 // ---- What nothing has written -----------------------------------------------------------------------------------
 
-void Emitter::check_undefined(std::span<const Component> components, const std::string& object) {
-    if (!follows_undefined()) return;
-    llvm::Value* bad = nullptr;
+llvm::Value* Emitter::undefined_in_any(std::span<const Component> components) {
+    llvm::Value* undefined = nullptr;
     for (const Component& component : components) {
         if (!component.undefined) continue;
         llvm::Value* more =
             component.undefined->getType()->isVectorTy() ? component.undefined : splat(component.undefined);
-        bad = bad ? builder.CreateOr(bad, more) : more;
+        undefined = undefined ? builder.CreateOr(undefined, more) : more;
     }
-    if (bad) check_fault(ShaderFault::uninitialized_read, bad, object);
+    return undefined;
+}
+
+void Emitter::check_undefined(std::span<const Component> components, const std::string& object) {
+    if (!follows_undefined()) return;
+    if (llvm::Value* bad = undefined_in_any(components)) check_fault(ShaderFault::uninitialized_read, bad, object);
 }
 
 void Emitter::check_outputs(const Variable& variable, std::span<const Component> values) {
@@ -416,6 +422,19 @@ void Emitter::spread_undefined(Component& result, std::span<const Component> arg
     result.undefined = undefined;
 }
 
+llvm::Value* Emitter::chosen_undefined(const Component& condition, const Component& yes, const Component& no) {
+    if (!condition.undefined && !yes.undefined && !no.undefined) return nullptr;
+    const bool is_uniform = condition.is_uniform() && yes.is_uniform() && no.is_uniform();
+    const auto shaped = [&](llvm::Value* value) { return value->getType()->isVectorTy() ? value : splat(value); };
+    const auto undefined_in = [&](const Component& value) {
+        return value.undefined ? shaped(value.undefined) : llvm::Constant::getNullValue(mask_type);
+    };
+    llvm::Value* undefined =
+        builder.CreateOr(undefined_in(condition),
+                         builder.CreateSelect(shaped(condition.value), undefined_in(yes), undefined_in(no)));
+    return is_uniform ? any(both(mask, undefined)) : undefined;
+}
+
 void Emitter::refine_undefined(Op op, std::span<const std::uint32_t> operands, std::vector<Component>& result) {
     if (op != Op::OpSelect && op != Op::OpLogicalAnd && op != Op::OpLogicalOr) return;
     const auto shaped = [&](llvm::Value* value) { return value->getType()->isVectorTy() ? value : splat(value); };
@@ -426,26 +445,18 @@ void Emitter::refine_undefined(Op op, std::span<const std::uint32_t> operands, s
     for (std::size_t i = 0; i < result.size(); ++i) {
         const Component& a = first.components.size() == 1 ? first.components[0] : first.components.at(i);
         const Component& b = second.components.at(i);
-        llvm::Value* undefined = nullptr;
         if (op == Op::OpSelect) {
-            const Value third = get(operands[2]);
-            const Component& c = third.components.at(i);
-            if (!a.undefined && !b.undefined && !c.undefined) {
-                result[i].undefined = nullptr;
-                continue;
-            }
-            undefined = builder.CreateOr(undefined_in(a),
-                                         builder.CreateSelect(shaped(a.value), undefined_in(b), undefined_in(c)));
-        } else {
-            if (!a.undefined && !b.undefined) continue;
-            // One side alone may decide: false for "and", true for "or".
-            const auto decides = [&](const Component& value) {
-                llvm::Value* says = shaped(op == Op::OpLogicalAnd ? builder.CreateNot(value.value) : value.value);
-                return builder.CreateAnd(says, builder.CreateNot(undefined_in(value)));
-            };
-            undefined = builder.CreateAnd(builder.CreateOr(undefined_in(a), undefined_in(b)),
-                                          builder.CreateNot(builder.CreateOr(decides(a), decides(b))));
+            result[i].undefined = chosen_undefined(a, b, get(operands[2]).components.at(i));
+            continue;
         }
+        if (!a.undefined && !b.undefined) continue;
+        // One side alone may decide: false for "and", true for "or".
+        const auto decides = [&](const Component& value) {
+            llvm::Value* says = shaped(op == Op::OpLogicalAnd ? builder.CreateNot(value.value) : value.value);
+            return builder.CreateAnd(says, builder.CreateNot(undefined_in(value)));
+        };
+        llvm::Value* undefined = builder.CreateAnd(builder.CreateOr(undefined_in(a), undefined_in(b)),
+                                                   builder.CreateNot(builder.CreateOr(decides(a), decides(b))));
         result[i].undefined = result[i].is_uniform() ? any(both(mask, undefined)) : undefined;
     }
 }
@@ -512,6 +523,15 @@ llvm::Value* Emitter::check_vertex_memory(const std::string& object, std::uint32
                                           std::uint32_t bytes, llvm::Value* lanes_on) {
     return call_check_memory(check_site(object, -1, static_cast<std::int32_t>(buffer)), nullptr, addresses, bytes,
                              access_read | access_vertex, lanes_on, nullptr);
+}
+
+void Emitter::note_input(const Pointer& pointer, std::span<const Component> values) {
+    // Of vertex attributes their buffer is named.
+    llvm::Value* undefined = notes().stage == rhi::ShaderStage::fragment ? undefined_in_any(values) : nullptr;
+    if (!undefined) return;
+    builder.CreateCall(external("nacre_cpu_check_input", builder.getVoidTy(),
+                                {pointer_type, pointer_type, builder.getInt32Ty()}),
+                       {notes().running, check_site(pointer.path, -1, -1), mask_bits(both(effect_mask(), undefined))});
 }
 
 llvm::Value* Emitter::call_check_memory(llvm::Value* site, llvm::Value* descriptors, llvm::Value* addresses,

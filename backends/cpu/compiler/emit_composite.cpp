@@ -42,6 +42,11 @@ std::vector<Component> Emitter::evaluate_composite(Op op, Id type_id, std::span<
         }
         return part;
     };
+    const auto chosen = [&](const Component& condition, const Component& yes, const Component& no) {
+        Component made = apply({condition, yes, no}, [&](auto v) { return select(v[0], v[1], v[2]); });
+        if (follows_undefined()) made.undefined = chosen_undefined(condition, yes, no);
+        return made;
+    };
     switch (op) {
         case Op::OpCompositeConstruct: {
             std::vector<Component> components;
@@ -77,24 +82,26 @@ std::vector<Component> Emitter::evaluate_composite(Op op, Id type_id, std::span<
         case Op::OpVectorExtractDynamic: {
             const Value from = get(operands[0]);
             const Component index = get_scalar(operands[1]);
+            if (options.checks) check_undefined(std::span(&index, 1), origin_of(operands[1]));
             // A chain of selections: vectors have at most four components.
             Component result = zero(module.type(type_id));
             for (std::size_t i = 0; i < from.components.size(); ++i) {
                 const Component is_this = apply({index}, [&](auto v) {
                     return builder.CreateICmpEQ(v[0], llvm::ConstantInt::get(v[0]->getType(), i));
                 });
-                result = apply({is_this, from.components[i], result}, [&](auto v) { return select(v[0], v[1], v[2]); });
+                result = chosen(is_this, from.components[i], result);
             }
             return {result};
         }
         case Op::OpVectorInsertDynamic: {
             std::vector<Component> components = get(operands[0]).components;
             const Component value = get_scalar(operands[1]), index = get_scalar(operands[2]);
+            if (options.checks) check_undefined(std::span(&index, 1), origin_of(operands[2]));
             for (std::size_t i = 0; i < components.size(); ++i) {
                 const Component is_this = apply({index}, [&](auto v) {
                     return builder.CreateICmpEQ(v[0], llvm::ConstantInt::get(v[0]->getType(), i));
                 });
-                components[i] = apply({is_this, value, components[i]}, [&](auto v) { return select(v[0], v[1], v[2]); });
+                components[i] = chosen(is_this, value, components[i]);
             }
             return components;
         }

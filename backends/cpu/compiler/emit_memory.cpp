@@ -221,6 +221,7 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
         // An element of an array of resources.
         if (type.kind == TypeKind::array || type.kind == TypeKind::runtime_array) {
             Component index = get_scalar(index_id);
+            if (options.checks) check_undefined(std::span(&index, 1), origin_of(index_id));
             if (index.value->getType()->getScalarSizeInBits() != 32)
                 index = apply({index}, [&](auto v) {
                     return builder.CreateZExtOrTrunc(v[0], like(v[0], builder.getInt32Ty()));
@@ -349,7 +350,9 @@ Pointer Emitter::step(Pointer pointer, const Type& kind, Id index_id) {
     const bool is_tight = pointer.storage == StorageClass::Workgroup || kind.array_stride == 0;
     const std::int64_t stride = is_tight ? static_cast<std::int64_t>(module.tight_size(pointer.type)) : kind.array_stride;
     const bool is_signed = module.type(module.type_of(index_id)).is_signed;
-    const Component index = apply({get_scalar(index_id)}, [&](auto v) {
+    const Component steps = get_scalar(index_id);
+    if (options.checks) check_undefined(std::span(&steps, 1), origin_of(index_id));
+    const Component index = apply({steps}, [&](auto v) {
         llvm::Type* word = like(v[0], builder.getInt32Ty());
         return is_signed ? builder.CreateSExtOrTrunc(v[0], word) : builder.CreateZExtOrTrunc(v[0], word);
     });
@@ -504,7 +507,19 @@ Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t ind
         Pointer through = pointer;
         through.variable = &spilled;
         spilled.type = variable.type;
-        return load_lane_component(through, index, scalar);
+        Component loaded = load_lane_component(through, index, scalar);
+        if (!std::ranges::any_of(variable.components, &Component::undefined)) return loaded;
+        LaneVariable told;
+        told.type = variable.type;
+        told.memory =
+            make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * 4 * lanes), "undefined");
+        std::vector<Component> flags;
+        for (const Component& component : variable.components)
+            flags.emplace_back(component.undefined ? component.undefined : builder.getFalse());
+        fill(told, flags);
+        through.variable = &told;
+        loaded.undefined = load_lane_component(through, index, boolean_type()).value;
+        return loaded;
     }
     const Component element = pointer.dynamic_component;
     if (element.is_uniform() && (!pointer.valid || pointer.valid.is_uniform())) {
@@ -625,6 +640,7 @@ std::vector<Component> Emitter::load(const Pointer& pointer) {
                 values.back().undefined = load_lane_component(undefined_of(pointer), index, boolean_type()).value;
             ++index;
         });
+        if (follows_undefined() && pointer.storage == StorageClass::Input) note_input(pointer, values);
     } else if (pointer.kind == Pointer::Kind::bytes) {
         // Each word has a shadow of doubles or of what is undefined, and speed does not matter.
         if (!in_double() && !follows_undefined()) {

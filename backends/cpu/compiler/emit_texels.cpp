@@ -132,7 +132,7 @@ std::vector<Component> Emitter::fetch_directly(const Component& image, Id image_
     const auto block = [&](const char* block_name) { return llvm::BasicBlock::Create(context, block_name, function_); };
     llvm::BasicBlock *word_block = block("fetch_words"), *call = block("fetch_call"), *after = block("fetched");
     const auto layout_number = [&](DirectTexels which) { return builder.getInt32(static_cast<std::uint32_t>(which)); };
-    llvm::SwitchInst* which = builder.CreateSwitch(known, call, 2);
+    llvm::SwitchInst* which = builder.CreateSwitch(known, call, 3);
     which->addCase(layout_number(is_integer ? DirectTexels::integer_word : DirectTexels::float_word), word_block);
     std::array<std::vector<std::pair<llvm::Value*, llvm::BasicBlock*>>, 4> arriving;
     const auto arrive = [&](const std::array<llvm::Value*, 4>& texel) {
@@ -160,6 +160,26 @@ std::vector<Component> Emitter::fetch_directly(const Component& image, Id image_
     llvm::Value* texels = builder.CreateMaskedGather(
         words, builder.CreateGEP(builder.getInt8Ty(), places.data, places.offset), llvm::Align(4), places.inside, none);
     arrive({texels, none, none, one(places.inside)});
+
+    // Tables, whose entries lie anywhere: materials ask them for every pixel.
+    if (is_integer && !is_row) {
+        llvm::BasicBlock* pair_block = block("fetch_pairs");
+        which->addCase(layout_number(DirectTexels::integer_pair), pair_block);
+        builder.SetInsertPoint(pair_block);
+        places = texel_places(view, type, coordinates, level.value, 8);
+        llvm::Type* wide = vector_of(builder.getInt64Ty());
+        llvm::Value* pairs = builder.CreateMaskedGather(
+            wide, builder.CreateGEP(builder.getInt8Ty(), places.data, places.offset), llvm::Align(4), places.inside,
+            llvm::Constant::getNullValue(wide));
+        pairs = builder.CreateBitCast(pairs, llvm::FixedVectorType::get(word, 2 * lanes));
+        std::array<llvm::Value*, 2> channels{};
+        for (std::uint32_t c = 0; c < 2; ++c) {
+            std::vector<int> of_channel(lanes);
+            for (std::uint32_t i = 0; i < lanes; ++i) of_channel[i] = static_cast<int>(2 * i + c);
+            channels[c] = builder.CreateShuffleVector(pairs, of_channel);
+        }
+        arrive({channels[0], channels[1], none, one(places.inside)});
+    }
 
     // In fragment shaders, which look into other pictures, code for more layouts is hardly worth its time.
     if (!is_integer && module.model == spv::ExecutionModel::GLCompute) {

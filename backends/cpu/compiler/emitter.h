@@ -374,6 +374,7 @@ class Emitter {
     /// Indices on the way of a pointer, and the whole value that it leads to.
     void check_range(const Pointer& pointer);
     void check_index(const Component& index, const Component& bound, const std::string& object, const Pointer* pointer = nullptr);
+    llvm::Value* undefined_in_any(std::span<const Component> components);  ///< Null: nowhere.
     void check_undefined(std::span<const Component> components, const std::string& object);
     /// Every quad in which some but not all lanes run.
     void check_quads();
@@ -388,6 +389,8 @@ class Emitter {
                                      std::uint32_t bytes, llvm::Value* lanes_on);
     /// The same for the image operation whose arguments are in place.
     llvm::Value* check_image(llvm::Value* image, llvm::Value* sampler, std::uint32_t flags, llvm::Value* lanes_on);
+    /// Takes note of a read of an input whose components may be undefined.
+    void note_input(const Pointer& pointer, std::span<const Component> values);
     void check_barrier();
     /// A workgroup begins: nothing has written its memory.
     void check_workgroup(llvm::Value* kernel_context, llvm::Value* memory);
@@ -396,6 +399,8 @@ class Emitter {
     void spread_undefined(Component& result, std::span<const Component> arguments);
     /// The same for operations whose result may not depend on all of their arguments.
     void refine_undefined(spv::Op op, std::span<const std::uint32_t> operands, std::vector<Component>& result);
+    /// Where `condition ? yes : no` is undefined.
+    llvm::Value* chosen_undefined(const Component& condition, const Component& yes, const Component& no);
     void mark_undefined(LaneVariable& variable, bool is_undefined = true);
     [[nodiscard]] static Pointer undefined_of(const Pointer& pointer);  ///< To the variable's `undefined`.
     [[nodiscard]] static const Type& boolean_type();

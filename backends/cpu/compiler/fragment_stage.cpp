@@ -105,12 +105,27 @@ Component FragmentEmitter::evaluate_input(std::uint32_t index, const Place& plac
     return scalar.bits == 32 || in_double() ? value : Component(math.convert_float(value.value, scalar_type(scalar)));
 }
 
+llvm::Value* FragmentEmitter::undefined_input(std::uint32_t index) {
+    const std::size_t offset = sizeof(PrimitiveData) + (input_scalars_.size() + index) * sizeof(Plane);
+    llvm::Value* none = llvm::Constant::getNullValue(vector_of(builder.getFloatTy()));
+    const auto differs = [&](std::size_t part) {
+        return builder.CreateFCmpONE(primitive_word(offset + part, builder.getFloatTy()).value, none);
+    };
+    // The plane through three zeros is zero all over. Elsewhere a vertex has a share in every pixel.
+    llvm::Value* undefined = differs(offsetof(Plane, c));
+    if (program.inputs[index].interpolation == Interpolation::flat) return undefined;
+    return builder.CreateOr(undefined,
+                            builder.CreateOr(differs(offsetof(Plane, dx)), differs(offsetof(Plane, dy))));
+}
+
 std::vector<llvm::Value*> FragmentEmitter::evaluate_inputs() {
     std::vector<llvm::Value*> values;
     for (std::uint32_t i = 0; i < input_scalars_.size(); ++i) {
         const InterfaceScalar& at = input_scalars_[i];
         values.push_back(evaluate_input(i, at.centroid && !program.runs_per_sample ? centroid : center, module.type(at.type)).value);
     }
+    if (follows_undefined())
+        for (std::uint32_t i = 0; i < input_scalars_.size(); ++i) values.push_back(undefined_input(i));
     values.push_back(evaluate_plane(offsetof(PrimitiveData, depth), center).value);
     values.push_back(evaluate_plane(offsetof(PrimitiveData, inverse_w), center).value);
     return values;
@@ -194,6 +209,14 @@ void FragmentEmitter::declare_inputs() {
             input_scalars_.push_back(word);
         }
     }
+    if (follows_undefined()) {
+        program.inputs.reserve(2 * program.inputs.size());
+        for (std::size_t i = 0; i < input_scalars_.size(); ++i) {
+            FragmentInput told = program.inputs[i];
+            told.location += undefined_location;
+            program.inputs.push_back(told);
+        }
+    }
     for (const auto& [id, function] : module.functions())
         for (const Block& block : function.blocks) {
             if (block.terminator.op == Op::OpKill || block.terminator.op == Op::OpTerminateInvocation) program.discards = true;
@@ -265,13 +288,16 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
     std::vector<Component> made;
     for (std::size_t i = 0; i < scalars->size(); ++i) {
         const std::uint32_t number = numbers->second[i];
+        llvm::Value* undefined = follows_undefined() ? inputs_[input_scalars_.size() + number] : nullptr;
         if (!(*scalars)[i].is_wide) {
             made.push_back(Component(inputs_[number]));
+            made.back().undefined = undefined;
             continue;
         }
         llvm::Type* wide = vector_of(builder.getInt64Ty());
         llvm::Value* bits = builder.CreateOr(builder.CreateZExt(inputs_[number], wide), builder.CreateShl(builder.CreateZExt(inputs_[number + 1], wide), 32));
         made.emplace_back(builder.CreateBitCast(bits, vector_of(scalar_type(module.type((*scalars)[i].type)))));
+        made.back().undefined = undefined;
     }
     return made;
 }
@@ -285,7 +311,14 @@ Component FragmentEmitter::difference(const Component& value, bool vertical, boo
         low[i] = static_cast<int>(first);
         high[i] = static_cast<int>(first + (vertical ? 2 : 1));
     }
-    return Component(builder.CreateFSub(builder.CreateShuffleVector(value.value, high), builder.CreateShuffleVector(value.value, low)));
+    Component made = builder.CreateFSub(builder.CreateShuffleVector(value.value, high),
+                                        builder.CreateShuffleVector(value.value, low));
+    if (value.undefined && value.undefined->getType()->isVectorTy())
+        made.undefined = builder.CreateOr(builder.CreateShuffleVector(value.undefined, high),
+                                          builder.CreateShuffleVector(value.undefined, low));
+    else
+        made.undefined = value.undefined;
+    return made;
 }
 
 bool FragmentEmitter::emit_stage(const Instruction& at) {
@@ -332,7 +365,12 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
             if (numbers == input_numbers_.end() || pointer.dynamic_component) reject("interpolation at a place needs an input with a constant index");
             std::vector<Component> made;
             std::uint32_t index = pointer.component;
-            for_each_component_type(at.type, [&](const Type& scalar) { made.push_back(evaluate_input(numbers->second.at(index++), place, scalar)); });
+            for_each_component_type(at.type, [&](const Type& scalar) {
+                const std::uint32_t input = numbers->second.at(index++);
+                made.push_back(evaluate_input(input, place, scalar));
+                if (follows_undefined()) made.back().undefined = inputs_[input_scalars_.size() + input];
+            });
+            note_input(pointer, made);
             set(at, std::move(made));
             return true;
         }

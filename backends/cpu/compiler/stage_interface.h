@@ -15,6 +15,10 @@ namespace nacre::cpu {
 /// Behind all locations of shaders: the distances that the vertex stage hands on under a name.
 inline constexpr std::uint32_t clip_distance_location = 1u << 20, cull_distance_location = clip_distance_location + 1;
 
+/// Behind those: beside the output at a location whether it is undefined, a number other than zero where it is. Of vertex
+/// and fragment shaders that are checked; linked and interpolated like any other.
+inline constexpr std::uint32_t undefined_location = 1u << 24;
+
 struct InterfaceScalar {
     std::uint32_t location = 0, component = 0;
     bool is_wide = false;                                   ///< 64 bits: two words,

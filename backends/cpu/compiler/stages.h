@@ -78,6 +78,9 @@ class FragmentEmitter final : public Emitter {
     /// `evaluate` for batches of one primitive and for others, whichever the batch is.
     std::vector<llvm::Value*> for_one_or_several(const std::function<std::vector<llvm::Value*>()>& evaluate);
     Place place_at(llvm::Value* inside_x, llvm::Value* inside_y);
+    /// Lanes in which a word of program.inputs is undefined: some vertex of the primitive that has a share in it has not
+    /// written it.
+    llvm::Value* undefined_input(std::uint32_t index);
     Component difference(const Component& value, bool vertical, bool is_fine);
     void emit_batch();
     void store_outputs();
@@ -92,8 +95,10 @@ class FragmentEmitter final : public Emitter {
     std::unordered_map<std::size_t, llvm::Value*> joined_words_;
     bool keeps_joined_words = false;
     std::unordered_map<Id, std::vector<std::uint32_t>> input_numbers_;  ///< For each scalar of an input variable.
-    std::vector<InterfaceScalar> input_scalars_;  ///< For each of program.inputs.
-    std::vector<llvm::Value*> inputs_;            ///< Their values, and behind them gl_FragCoord.z and .w.
+    /// For each of program.inputs but those that tell, where values are followed, which of the others are undefined.
+    std::vector<InterfaceScalar> input_scalars_;
+    /// Their values, where they are undefined if somebody asks, and behind them gl_FragCoord.z and .w.
+    std::vector<llvm::Value*> inputs_;
 };
 
 }  // namespace nacre::cpu

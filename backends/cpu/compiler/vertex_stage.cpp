@@ -186,7 +186,7 @@ void VertexEmitter::store_outputs() {
     std::vector<BuiltInOutput> builtins;
     const auto add_builtin = [&](const Variable& variable, BuiltIn builtin, const Pointer& place) {
         builtins.push_back({builtin, load(place)});
-        // Other outputs may be undefined as long as no fragment depends on them.
+        // Other outputs may be undefined as long as no fragment depends on them, which fragment shaders look after.
         if (options.checks) check_outputs(variable, builtins.back().values);
     };
     for (const Id id : module.interface()) {
@@ -210,6 +210,15 @@ void VertexEmitter::store_outputs() {
             const std::vector<Component> values = load(pointer);
             for (std::size_t i = 0; i < scalars->size(); ++i) {
                 const InterfaceScalar& at = (*scalars)[i];
+                if (values[i].undefined) {
+                    constexpr std::int32_t one = 0x3f800000;
+                    llvm::Value* told = widen(Component(values[i].undefined));
+                    program.outputs.push_back({undefined_location + at.location, at.component, program.output_slots});
+                    if (at.is_wide)
+                        program.outputs.push_back(
+                            {undefined_location + at.upper_location, at.upper_component, program.output_slots});
+                    put(program.output_slots++, Component(select(told, splat(int32(one)), splat(int32(0)))));
+                }
                 program.outputs.push_back({at.location, at.component, program.output_slots});
                 if (!at.is_wide) {
                     put(program.output_slots++, values[i]);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "backends/cpu/images/double_texels.h"
+#include "backends/cpu/images/elliptical_weights.h"
 #include "backends/cpu/images/format_plan.h"
 #include "backends/cpu/images/view_axes.h"
 
@@ -93,6 +94,7 @@ class Lane {
          std::uint32_t flags, std::uint32_t number)
         : image_(image),
           sampler_(sampler ? &sampler->desc : nullptr),
+          is_elliptical_(sampler && sampler->is_elliptical),
           arguments_(arguments),
           flags_(flags),
           lane_(number),
@@ -124,7 +126,9 @@ class Lane {
 
     [[nodiscard]] DoubleTexel sample() {
         prepare();
-        const Detail detail = level_of_detail();
+        Detail detail = level_of_detail();
+        // The ellipse reads the finer one of two levels.
+        if (detail.is_elliptical) detail.lambda = std::floor(detail.lambda);
         const bool is_linear = (detail.lambda <= 0 ? sampler_->magnify : sampler_->minify) == rhi::Filter::linear;
         const auto [first, weight] = levels_of(detail.lambda);
         DoubleTexel result = sample_level(detail, first, is_linear);
@@ -177,6 +181,9 @@ class Lane {
         double unclamped = 0, lambda = 0;
         double sample_count = 1;  ///< Along the longer axis of the footprint.
         std::array<double, 2> axis{};
+        /// Filtering over the ellipse of these derivatives instead, in texels of level 0.
+        bool is_elliptical = false;
+        std::array<double, 2> dx{}, dy{};
     };
     struct Tap {
         DoubleTexel texel{};
@@ -290,7 +297,13 @@ class Lane {
             }
             const double longest = std::max(length_x, length_y), shortest = std::min(length_x, length_y);
             lambda = 0.5 * linear_log2(longest);
-            if (sampler_->max_anisotropy > 1.0f && count == 2 && !axes_.is_cube) {
+            if (is_elliptical_ && sampler_->max_anisotropy > 1.0f && count == 2 && !axes_.is_cube &&
+                !flag(image_compare)) {
+                lambda = 0.5 * linear_log2(shortest);
+                detail.is_elliptical = true;
+                for (std::size_t axis = 0; axis < 2; ++axis)
+                    detail.dx[axis] = dx[axis] * size[axis], detail.dy[axis] = dy[axis] * size[axis];
+            } else if (sampler_->max_anisotropy > 1.0f && count == 2 && !axes_.is_cube) {
                 const double limit = std::min(sampler_->max_anisotropy, 16.0f);
                 double ratio = std::sqrt(longest) / std::sqrt(shortest);
                 ratio = ratio > 1 ? std::min(ratio, limit) : 1.0;
@@ -318,6 +331,7 @@ class Lane {
     }
 
     [[nodiscard]] DoubleTexel sample_level(const Detail& detail, std::uint32_t level, bool is_linear) {
+        if (detail.is_elliptical) return average_ellipse(detail, level);
         if (detail.sample_count <= 1) return sample_once(level, coordinates_, is_linear);
         // Samples at i / (N + 1) - 1/2 of the longer axis, i = 1 ... N.
         DoubleTexel sum{};
@@ -329,6 +343,46 @@ class Lane {
             for (std::size_t c = 0; c < 4; ++c) sum[c] += once[c];
         }
         for (double& channel : sum) channel /= detail.sample_count;
+        return sum;
+    }
+
+    /// The filter of kernels/elliptical_filter.h.
+    [[nodiscard]] DoubleTexel average_ellipse(const Detail& detail, std::uint32_t number) const {
+        const ImageLevel& level = image_.levels[number];
+        const double scale = std::ldexp(1.0, -static_cast<int>(number));
+        const double ux = detail.dx[0] * scale, vx = detail.dx[1] * scale, uy = detail.dy[0] * scale,
+                     vy = detail.dy[1] * scale;
+        const double a = vx * vx + vy * vy + 1.0, b = -2.0 * (ux * vx + uy * vy), c = ux * ux + uy * uy + 1.0;
+        const double f = a * c - 0.25 * b * b, d = 4.0 * f;
+        const auto bounded = [](double extent, std::uint32_t size) {
+            return extent >= 0.0 ? std::min(extent, 2.0 * size) : 0.0;
+        };
+        const auto center = [&](std::size_t axis, std::uint32_t size, rhi::AddressMode mode) {
+            const double at = in_texels(coordinates_[axis], size, mode);
+            return (std::isnan(at) ? 0.0 : std::clamp(at, -farthest_texel, farthest_texel)) - 0.5;
+        };
+        const double u = center(0, level.width, sampler_->address_u), v = center(1, level.height, sampler_->address_v);
+        const double half_width = bounded(2.0 / d * std::sqrt(d * c * f), level.width),
+                     half_height = bounded(2.0 / d * std::sqrt(d * a * f), level.height);
+        const double to_index = (elliptical_weight_count - 1) / f;
+        DoubleTexel sum{};
+        double weights = 0.0;
+        for (double y = std::floor(v - half_height); y <= std::ceil(v + half_height); y += 1.0)
+            for (double x = std::floor(u - half_width); x <= std::ceil(u + half_width); x += 1.0) {
+                const double dx = x - u, dy = y - v, q = (a * dx * dx + b * dx * dy + c * dy * dy) * to_index;
+                if (!(q < elliptical_weight_count)) continue;
+                const double weight =
+                    static_cast<double>(elliptical_weights()[static_cast<std::size_t>(std::max(q, 0.0))]);
+                bool is_border = false;
+                const std::int64_t at_x = wrapped(static_cast<std::int64_t>(x) + (has_offset_ ? offset_[0] : 0),
+                                                  level.width, sampler_->address_u, is_border);
+                const std::int64_t at_y = wrapped(static_cast<std::int64_t>(y) + (has_offset_ ? offset_[1] : 0),
+                                                  level.height, sampler_->address_v, is_border);
+                const DoubleTexel found = is_border ? border() : texel(number, at_x, at_y, slice_);
+                for (std::size_t channel = 0; channel < 4; ++channel) sum[channel] += weight * found[channel];
+                weights += weight;
+            }
+        for (double& channel : sum) channel /= weights;
         return sum;
     }
 
@@ -462,6 +516,7 @@ class Lane {
 
     const ImageView& image_;
     const rhi::SamplerDesc* sampler_;
+    const bool is_elliptical_;
     const DoubleImageArguments& arguments_;
     const std::uint32_t flags_, lane_;
     const Axes axes_;

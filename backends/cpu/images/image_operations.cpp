@@ -45,12 +45,15 @@ TexelWords fetch_texel(const ImageView* image, std::uint32_t first, std::uint32_
     const bool is_integer = (flags & image_integer) != 0;
     const auto joined = [](std::uint32_t low, std::uint32_t high) { return low | std::uint64_t{high} << 32; };
     const DirectTexels words = is_integer ? DirectTexels::integer_word : DirectTexels::float_word;
-    if (image->direct_texels == words && image->dimension == rhi::ViewDimension::d2 && level < image->mip_count) {
+    const bool is_pair = is_integer && image->direct_texels == DirectTexels::integer_pair;
+    if ((image->direct_texels == words || is_pair) && image->dimension == rhi::ViewDimension::d2 &&
+        level < image->mip_count) {
         const ImageLevel& from = image->levels[level];
         if (first >= from.width || second >= from.height) return {};
-        std::uint32_t word = 0;
-        std::memcpy(&word, from.data + std::size_t{second} * from.row_stride + std::size_t{first} * 4, sizeof(word));
-        return {word, joined(0, is_integer ? 1 : std::bit_cast<std::uint32_t>(1.0f))};
+        const std::size_t bytes = is_pair ? 8 : 4;
+        std::uint64_t first_two = 0;
+        std::memcpy(&first_two, from.data + std::size_t{second} * from.row_stride + first * bytes, bytes);
+        return {first_two, joined(0, is_integer ? 1 : std::bit_cast<std::uint32_t>(1.0f))};
     }
     static const NacreCpuImageFunction run = image_function(4);
     ImageArguments arguments;

@@ -32,6 +32,27 @@ ChannelBits channel_bits(rhi::Format format, std::uint32_t index) {
     return {bits * index, bits};
 }
 
+bool is_of_destination(rhi::BlendFactor factor) {
+    using enum rhi::BlendFactor;
+    switch (factor) {
+        case destination_color:
+        case one_minus_destination_color:
+        case destination_alpha:
+        case one_minus_destination_alpha:
+        case source_alpha_saturated: return true;
+        default: return false;
+    }
+}
+
+bool reads_destination(const rhi::BlendState& blend) {
+    const auto reads = [](rhi::BlendOperation operation, rhi::BlendFactor source, rhi::BlendFactor destination) {
+        return operation == rhi::BlendOperation::minimum || operation == rhi::BlendOperation::maximum ||
+               destination != rhi::BlendFactor::zero || is_of_destination(source);
+    };
+    return reads(blend.color_operation, blend.source_color, blend.destination_color) ||
+           reads(blend.alpha_operation, blend.source_alpha, blend.destination_alpha);
+}
+
 void plan_colors(const RasterPipeline& pipeline, const TargetSet& targets, DrawPlan& plan) {
     plan.color_count = 0;
     plan.dual_source = false;
@@ -48,6 +69,7 @@ void plan_colors(const RasterPipeline& pipeline, const TargetSet& targets, DrawP
         color.components = std::min(output.components, 4u);
         color.blends = state.blend.enabled && !rhi::info(format).is_integer();
         color.blend = state.blend;
+        color.reads_destination = color.blends && reads_destination(state.blend);
         color.write_mask = static_cast<std::uint8_t>(state.write_mask);
         bool any = false;
         for (std::uint32_t channel = 0; channel < 4; ++channel) {
@@ -230,6 +252,7 @@ void plan_draw(const DrawState& state, const DrawCall& call, const TargetSet& ta
     plan.depth_bias_slope = pipeline.depth_stencil.depth_bias_slope;
     plan.depth_bias_clamp = pipeline.depth_stencil.depth_bias_clamp;
     plan_colors(pipeline, targets, plan);
+    plan.check_blend = state.check_blend;
     plan_tests(state, targets, hierarchical_depth, plan);
     std::copy(state.blend_constants.begin(), state.blend_constants.end(), plan.blend_constants);
     plan_rectangle(state, targets, plan);

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "backends/cpu/checks/check_interface.h"
 #include "backends/cpu/image_view.h"
 #include "backends/cpu/program.h"
 #include "backends/cpu/scheduler.h"
@@ -55,6 +56,7 @@ struct DrawState {
     rhi::Rectangle scissor{};
     std::uint8_t stencil_reference = 0;
     std::array<float, 4> blend_constants{};
+    BlendCheck check_blend = nullptr;  ///< Told of what blending reads; null: nobody asks.
 };
 
 struct DrawCall {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "backends/cpu/checks/check_interface.h"
 #include "backends/cpu/raster/srgb_tables.h"
 #include "backends/cpu/shader_interface.h"
 #include "rhi/pipeline.h"
@@ -154,6 +155,7 @@ struct ColorPlan {
     std::uint32_t output;  ///< Into FragmentBatch::colors.
     std::uint32_t components;
     bool blends, partial;  ///< `partial`: the write mask leaves channels of the format out.
+    bool reads_destination;  ///< Blends, and what comes of it depends on what the target holds.
     bool as_it_is;         ///< Texels are the words of the output, without any conversion.
     std::uint8_t write_mask;  ///< One bit for each channel.
     rhi::BlendState blend;
@@ -180,6 +182,7 @@ struct DrawPlan {
     ColorPlan colors[8];
     bool dual_source;
     float blend_constants[4];
+    BlendCheck check_blend;  ///< Told of what blending reads; null: nobody asks.
     std::int32_t x_begin, x_end, y_begin, y_end;  ///< Pixels that may be drawn.
     // Clip coordinates to window coordinates: for planes from clip coordinates.
     double scale[3], translation[3];
@@ -198,9 +201,15 @@ inline constexpr std::uint32_t stream_batches = stream_quads;  ///< Of one quad 
 /// A stream is emptied when it holds `stream_quads`, which four blocks that are appended together may pass by; they are
 /// appended without branches, which takes another block.
 inline constexpr std::uint32_t stream_capacity = stream_quads + 16 + 4;
+/// With sixteen lanes, blocks that are covered as a whole wait by themselves, a batch for each: nothing of them is
+/// sorted or masked. As many wait at most, behind the batches of the stream.
+inline constexpr std::uint32_t most_whole_blocks = 8;
+static_assert(stream_quads / max_quads + most_whole_blocks <= stream_batches);
+/// How many primitives may be drawn as long as a quad or a whole block waits, beyond those with a quad that waits.
+inline constexpr std::uint32_t most_whole_primitives = 32, most_primitives_beside = 32;
 /// One slot for each quad that waits, the primitive that is drawn, and some so that none is used again too early.
-inline constexpr std::uint32_t primitive_slots = 2 * stream_quads;
-static_assert(primitive_slots > stream_capacity);
+inline constexpr std::uint32_t primitive_slots = 4 * stream_quads;
+static_assert(primitive_slots > stream_capacity + most_whole_primitives + most_primitives_beside + 1);
 
 /// Quads that wait for the fragment function.
 struct Stream {
@@ -226,6 +235,8 @@ struct alignas(64) Workspace {
     std::uint32_t* colors;         ///< For the whole tile; aligned to 64 bytes.
     std::byte* primitives;         ///< `primitive_slots` of the largest DrawPlan::primitive_bytes.
     std::uint64_t passed_samples;  ///< Counts up.
+    /// First lanes of the blocks that wait as a whole.
+    alignas(64) std::uint32_t whole_places[16];
 };
 
 struct TileJob {

@@ -81,6 +81,42 @@ struct TileArea {
     std::int32_t width, height;  ///< Pixels; what of a block sticks out of them is not in the target.
 };
 
+#if defined(__AVX512F__)
+/// Four blocks side by side to their four rows of sixteen texels of a word, and back.
+NACRE_LANES_INLINE void blocks_to_rows(const IntRegister (&blocks)[4], IntRegister (&rows)[4]) {
+    for (int pair = 0; pair < 2; ++pair) {
+        IntRegister halves[2];  // The left and the right half of two rows.
+        for (int half = 0; half < 2; ++half) {
+            const IntRegister left = blocks[2 * half], right = blocks[2 * half + 1];
+            halves[half] = pair == 0 ? __builtin_shufflevector(left, right, 0, 1, 4, 5, 16, 17, 20, 21, 2, 3, 6, 7, 18,
+                                                               19, 22, 23)
+                                     : __builtin_shufflevector(left, right, 8, 9, 12, 13, 24, 25, 28, 29, 10, 11, 14,
+                                                               15, 26, 27, 30, 31);
+        }
+        rows[2 * pair] = __builtin_shufflevector(halves[0], halves[1], 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21,
+                                                 22, 23);
+        rows[2 * pair + 1] = __builtin_shufflevector(halves[0], halves[1], 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26,
+                                                     27, 28, 29, 30, 31);
+    }
+}
+NACRE_LANES_INLINE void rows_to_blocks(const IntRegister (&rows)[4], IntRegister (&blocks)[4]) {
+    IntRegister halves[2][2];  // The upper and the lower half of blocks 0 and 1, and of 2 and 3.
+    for (int pair = 0; pair < 2; ++pair) {
+        const IntRegister top = rows[2 * pair], bottom = rows[2 * pair + 1];
+        halves[pair][0] =
+            __builtin_shufflevector(top, bottom, 0, 1, 16, 17, 2, 3, 18, 19, 4, 5, 20, 21, 6, 7, 22, 23);
+        halves[pair][1] =
+            __builtin_shufflevector(top, bottom, 8, 9, 24, 25, 10, 11, 26, 27, 12, 13, 28, 29, 14, 15, 30, 31);
+    }
+    for (int half = 0; half < 2; ++half) {
+        blocks[2 * half] = __builtin_shufflevector(halves[0][half], halves[1][half], 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18,
+                                                   19, 20, 21, 22, 23);
+        blocks[2 * half + 1] = __builtin_shufflevector(halves[0][half], halves[1][half], 8, 9, 10, 11, 12, 13, 14, 15,
+                                                       24, 25, 26, 27, 28, 29, 30, 31);
+    }
+}
+#endif
+
 /// Rows of texels of `bytes` bytes to blocks, and back.
 template <int bytes>
 inline void load_pixels(const std::byte* from, std::uint32_t row_stride, const TileArea& area) {
@@ -88,7 +124,18 @@ inline void load_pixels(const std::byte* from, std::uint32_t row_stride, const T
     for (std::int32_t y = 0; y < area.height; y += 4) {
         const std::byte* const line = from + static_cast<std::size_t>(y) * row_stride;
         std::int32_t* block = area.blocks + static_cast<std::size_t>(y / 4) * area.row_words;
-        for (std::int32_t x = 0; x < area.width; x += 4, block += area.block_words) {
+        std::int32_t x = 0;
+#if defined(__AVX512F__)
+        if constexpr (bytes == 4)
+            for (; x + 16 <= area.width && y + 4 <= area.height; x += 16) {
+                IntRegister rows[4], blocks[4];
+                for (int row = 0; row < 4; ++row)
+                    std::memcpy(&rows[row], line + static_cast<std::size_t>(row) * row_stride + x * bytes, 64);
+                rows_to_blocks(rows, blocks);
+                for (int i = 0; i < 4; ++i, block += area.block_words) std::memcpy(block, &blocks[i], 64);
+            }
+#endif
+        for (; x < area.width; x += 4, block += area.block_words) {
             if (x + 4 <= area.width && y + 4 <= area.height) {
                 Int4 rows[4][words];
                 for (int row = 0; row < 4; ++row)
@@ -122,11 +169,31 @@ inline void store_pixels(std::byte* to, std::uint32_t row_stride, const TileArea
         std::byte* const line = to + static_cast<std::size_t>(y) * row_stride;
         const std::int32_t* const blocks = area.blocks + static_cast<std::size_t>(y / 4) * area.row_words;
         const std::int32_t whole = area.height - y < 4 ? 0 : area.width / 4;
+        std::int32_t first = 0;
+#if defined(__AVX512F__)
+        // Whole lines of the cache.
+        if constexpr (bytes == 4)
+            if (!streams || ((reinterpret_cast<std::uintptr_t>(line) | row_stride) & 63) == 0) {
+                const std::int32_t* block = blocks;
+                for (; first + 4 <= whole; first += 4) {
+                    IntRegister four[4], rows[4];
+                    for (int i = 0; i < 4; ++i, block += area.block_words) std::memcpy(&four[i], block, 64);
+                    blocks_to_rows(four, rows);
+                    for (int row = 0; row < 4; ++row) {
+                        std::byte* const texels = line + static_cast<std::size_t>(row) * row_stride + first * 16;
+                        if constexpr (streams)
+                            _mm512_stream_si512(reinterpret_cast<__m512i*>(texels), (__m512i)rows[row]);
+                        else
+                            std::memcpy(texels, &rows[row], 64);
+                    }
+                }
+            }
+#endif
         // Row by row, two at once, so that lines of the cache are written as a whole.
         for (int pair = 0; pair < 2; ++pair) {
-            std::byte* texels = line + static_cast<std::size_t>(2 * pair) * row_stride;
-            const std::int32_t* block = blocks + 8 * pair;
-            for (std::int32_t x = 0; x < whole; ++x, texels += 4 * bytes, block += area.block_words) {
+            std::byte* texels = line + static_cast<std::size_t>(2 * pair) * row_stride + first * (4 * bytes);
+            const std::int32_t* block = blocks + 8 * pair + static_cast<std::size_t>(first) * area.block_words;
+            for (std::int32_t x = first; x < whole; ++x, texels += 4 * bytes, block += area.block_words) {
                 Int4 top[words], bottom[words];
                 for (int word = 0; word < words; ++word) {
                     const Int4 left = load4(block + 16 * word), right = load4(block + 16 * word + 4);

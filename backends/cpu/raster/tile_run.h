@@ -65,6 +65,11 @@ struct TileRun {
     const std::byte* vertex_memory = nullptr;
     const PrimitiveData* primitive = nullptr;
     std::uint32_t next_slot = 0;
+    // Blocks that wait as a whole, in a draw that lets them. What waits there and in the stream are different blocks.
+    bool keeps_whole = false;
+    std::uint32_t whole_count = 0;
+    std::uint32_t whole_primitives = 0;  ///< Primitives whose first block waited as a whole, since nothing waited.
+    std::uint32_t appended_beside = 0;   ///< Blocks appended to the stream since the first whole one waits.
     // One bit for each region: colors that are in the tile's memory, those of all targets that the draw writes, and of
     // each.
     std::uint32_t entered_regions = 0, loaded_regions[8] = {};
@@ -91,7 +96,8 @@ struct TileRun {
         for (std::uint32_t sample = 0; sample < most_samples; ++sample) memory.streams[sample].quads = 0;
         if (targets.samples > 1) return;
         // The same for all batches.
-        for (std::uint32_t i = 0; i < stream_quads / (job.lanes / 4); ++i) set_samples(memory.batches[i], 1, 0, false);
+        const std::uint32_t batches = stream_quads / (job.lanes / 4) + (job.lanes == 16 ? most_whole_blocks : 0);
+        for (std::uint32_t i = 0; i < batches; ++i) set_samples(memory.batches[i], 1, 0, false);
     }
 
     // ---- Targets -------------------------------------------------------------------------------------------------
@@ -235,6 +241,7 @@ struct TileRun {
         }
         entered_regions = ~0u;
         for (std::uint32_t i = 0; i < draw->color_count; ++i) entered_regions &= loaded_regions[draw->colors[i].target];
+        keeps_whole = draw->plain_results && job.lanes == 16;
         if (draw->plain_results) list_plain_words();
         if (depth) note_bounds(plan);
         const auto larger = [](std::int32_t a, std::int32_t b) { return a > b ? a : b; };
@@ -390,9 +397,11 @@ struct TileRun {
     /// @param alive    and those that passed the tests so far
     [[gnu::always_inline]] void append_block(std::uint32_t stream_index, std::uint32_t place, std::uint32_t live,
                                              const std::uint8_t* covered, const std::uint8_t* alive) {
-        Stream& stream = memory.streams[stream_index];
         const std::uint32_t region = (place >> 10) * regions_across + (place >> 6 & 3);
         if ((entered_regions >> region & 1) == 0) enter_region(region);
+        if (live == 0xffff && keeps_whole && !waits_in_stream(place)) return append_whole(place);
+        if (whole_count != 0 && (waits_as_whole(place) || ++appended_beside == most_primitives_beside)) flush_whole();
+        Stream& stream = memory.streams[stream_index];
         const PrimitiveData* const from = &current_primitive();
         const std::uint32_t first = stream.quads;
         repeat_pointer<4>(stream.primitives + first, from);
@@ -414,6 +423,7 @@ struct TileRun {
                                               std::uint32_t regions) {
         for (std::uint32_t fresh = regions & ~entered_regions; fresh != 0; fresh &= fresh - 1)
             enter_region(static_cast<std::uint32_t>(__builtin_ctz(fresh)));
+        if (whole_count != 0) flush_whole();
         Stream& stream = memory.streams[0];
         const PrimitiveData* const from = &current_primitive();
         repeat_pointer<4 * columns * rows>(stream.primitives + stream.quads, from);
@@ -441,7 +451,49 @@ struct TileRun {
         return used;
     }
 
+    // Of draws with one sample whose results are written as they come: which of two different blocks is written first
+    // does not matter, and what is drawn to one block keeps its order.
+
+    [[nodiscard]] NACRE_LANES_INLINE bool waits_as_whole(std::uint32_t place) const {
+        return (mask_of(equal(load(memory.whole_places), ints(static_cast<std::int32_t>(place)))) &
+                ((1u << whole_count) - 1)) != 0;
+    }
+    [[nodiscard]] NACRE_LANES_INLINE bool waits_in_stream(std::uint32_t place) const {
+        const Stream& stream = memory.streams[0];
+        const Ints block = ints(static_cast<std::int32_t>(place)), bits = ints(Stream::place_mask & ~15u);
+        static_assert(stream_quads == 32);
+        const std::uint32_t found = mask_of(equal(load(stream.places) & bits, block)) |
+                                    mask_of(equal(load(stream.places + 16) & bits, block)) << 16;
+        return (found & ((1u << stream.quads) - 1)) != 0;
+    }
+    /// A block all of whose pixels are drawn.
+    void append_whole(std::uint32_t place) {
+        if (whole_count == 0) appended_beside = 0;
+        if (!primitive && ++whole_primitives == most_whole_primitives) flush();
+        const PrimitiveData* const from = &current_primitive();
+        FragmentBatch& batch = memory.batches[stream_quads / max_quads + whole_count];
+        for (const PrimitiveData*& of_quad : batch.primitives) of_quad = from;
+        const auto quad = static_cast<std::int32_t>(place >> 2);
+        store4(batch.x, Int4{0, 2, 0, 2} + ((quad & 60) + tile_x));
+        store4(batch.y, Int4{0, 0, 2, 2} + ((quad >> 4 & 60) + tile_y));
+        batch.live = 0xffff;
+        memory.whole_places[whole_count] = place;
+        if (++whole_count == most_whole_blocks) flush_whole();
+    }
+    [[gnu::noinline]] void flush_whole() {
+        FragmentBatch* const batches = memory.batches + stream_quads / max_quads;
+        draw->fragment(draw->context, batches, whole_count);
+        for (std::uint32_t i = 0; i < whole_count; ++i)
+            write_words(batches[i], [&](auto&& each) {
+                each(memory.whole_places[i], 0,
+                     [](std::uint32_t* to, const std::uint32_t* from) { store(to, load(from)); });
+            });
+        whole_count = 0;
+    }
+
     void flush() {
+        if (whole_count != 0) flush_whole();
+        whole_primitives = 0;
         for (std::uint32_t sample = 0; sample < targets.samples; ++sample)
             if (memory.streams[sample].quads != 0) flush_stream(sample, memory.streams[sample].quads);
     }
@@ -513,34 +565,38 @@ struct TileRun {
         store(batch.centroid_x, floats(batch.sample_x)), store(batch.centroid_y, floats(batch.sample_y));
     }
 
-    /// The frequent case of `resolve`: one sample, tested before, nothing blended.
-    void write_plain(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t quads) {
+    /// Calls `write` with what writes the results of a batch where nothing is blended: each(place, lane, copy) calls
+    /// copy(to, from) for each word of the pixels from `lane` on, which lie from `place` on.
+    template <typename Write>
+    NACRE_LANES_INLINE void write_words(const FragmentBatch& batch, const Write& write) {
         alignas(64) std::uint32_t packed[8][4][16];
         if (plain_from_batch != plain_count)
             for (std::uint32_t i = 0; i < draw->color_count; ++i)
                 if (const ColorPlan& plan = draw->colors[i]; !plan.as_it_is)
                     pack_colors(plan, targets.colors[plan.target], *job.srgb, batch, packed[i]);
-        const std::uint32_t live = batch.live, from_batch = plain_from_batch, count = plain_count;
+        const std::uint32_t from_batch = plain_from_batch, count = plain_count;
         const std::size_t block_words = targets.color_planes * 16;
         std::uint32_t* const colors = memory.colors;
         const PlainWord* const words = plain_words;
         // What the fragment function has written as it is comes first.
-        const auto each = [&](std::uint32_t place, std::uint32_t lane, auto&& write) {
+        write([&](std::uint32_t place, std::uint32_t lane, auto&& copy) {
             std::uint32_t* const to = colors + (place >> 4) * block_words + (place & 15);
             std::uint32_t i = 0;
-            for (; i < from_batch; ++i) write(to + words[i].to, &batch.colors[0][0][0] + words[i].from + lane);
-            for (; i < count; ++i) write(to + words[i].to, &packed[0][0][0] + words[i].from + lane);
-        };
-        if (quads == 4 && live == 0xffff && is_block(places)) {
-            each(places[0], 0, [](std::uint32_t* to, const std::uint32_t* from) { store(to, load(from)); });
-            return;
-        }
-        for (std::uint32_t quad = 0; quad < quads; ++quad) {
-            // Quads of unfilled batches repeat others, without a live pixel.
-            const std::uint32_t pixels = live >> (4 * quad) & 15;
-            each(places[quad], 4 * quad,
-                 [&](std::uint32_t* to, const std::uint32_t* from) { store_some4(to, load4(from), pixels); });
-        }
+            for (; i < from_batch; ++i) copy(to + words[i].to, &batch.colors[0][0][0] + words[i].from + lane);
+            for (; i < count; ++i) copy(to + words[i].to, &packed[0][0][0] + words[i].from + lane);
+        });
+    }
+    /// The frequent case of `resolve`: one sample, tested before, nothing blended.
+    void write_plain(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t quads) {
+        const std::uint32_t live = batch.live;
+        write_words(batch, [&](auto&& each) {
+            for (std::uint32_t quad = 0; quad < quads; ++quad) {
+                // Quads of unfilled batches repeat others, without a live pixel.
+                const std::uint32_t pixels = live >> (4 * quad) & 15;
+                each(places[quad], 4 * quad,
+                     [&](std::uint32_t* to, const std::uint32_t* from) { store_some4(to, load4(from), pixels); });
+            }
+        });
     }
     /// Lists the words that write_plain writes.
     void list_plain_words() {
@@ -557,11 +613,6 @@ struct TileRun {
             }
             if (as_it_is) plain_from_batch = plain_count;
         }
-    }
-    /// Whether four quads are those of one block, in their order.
-    static bool is_block(const std::uint32_t* places) {
-        return places[0] % 16 == 0 && places[1] == places[0] + 4 && places[2] == places[0] + 8 &&
-               places[3] == places[0] + 12;
     }
 
     /// Tests and writes the results of one batch.
@@ -673,10 +724,33 @@ struct TileRun {
         return passed;
     }
 
+    /// Shows what the target holds of lanes, before it is blended with, to those who look for faults.
+    void check_destinations(const ColorPlan& plan, const FragmentBatch& batch, const std::uint32_t* places,
+                            std::uint32_t quads, std::uint32_t sample, std::uint32_t mask) const {
+        const ColorTarget& target = targets.colors[plan.target];
+        std::uint32_t old[4][max_lanes] = {};
+        for (std::uint32_t lane = 0; lane < 4 * quads; ++lane) {
+            if ((mask >> lane & 1) == 0) continue;
+            const std::uint32_t* const words = colors_at(places[lane / 4] + (lane & 3)) + color_offset(target, sample);
+            for (std::uint32_t word = 0; word < target.words; ++word) old[word][lane] = words[16 * word];
+            // Texels with doubles are never brought into the tile.
+            if (!draw->in_double || !target.shadow) continue;
+            const std::int32_t x = batch.x[lane / 4] + static_cast<std::int32_t>(lane & 1) - tile_x;
+            const std::int32_t y = batch.y[lane / 4] + static_cast<std::int32_t>(lane >> 1 & 1) - tile_y;
+            for (std::uint32_t word = 0; word < target.words; ++word)
+                std::memcpy(&old[word][lane], texels_of(target, sample, x, y) + 4 * word,
+                            target.texel_bytes < 4 ? target.texel_bytes : 4);
+        }
+        draw->check_blend(draw->context->checks, {plan.target, sample, batch.x, batch.y, old, mask});
+    }
+
     void write_color(const ColorPlan& plan, const FragmentBatch& batch, const std::uint32_t* places,
                      std::uint32_t quads, const std::uint32_t (&masks)[most_samples], std::uint32_t first,
                      std::uint32_t end, bool conflict) {
         const ColorTarget& target = targets.colors[plan.target];
+        if (plan.reads_destination && draw->check_blend)
+            for (std::uint32_t sample = first; sample < end; ++sample)
+                if (masks[sample] != 0) check_destinations(plan, batch, places, quads, sample, masks[sample]);
         if (draw->in_double && target.shadow) {
             for (std::uint32_t sample = first; sample < end; ++sample)
                 if (masks[sample] != 0) write_double_colors(*draw, plan, target, batch, sample, masks[sample]);

@@ -4,11 +4,10 @@
 #include <cstring>
 #include <numeric>
 
-#include <spirv-tools/libspirv.hpp>
-
 #include "rhi/device.h"
 #include "rhi/shader_compiler.h"
 #include "samples/backends.h"
+#include "tests/rhi/assembly.h"
 
 namespace nacre::cpu {
 
@@ -50,16 +49,10 @@ Expected<std::vector<std::uint32_t>> ComputeRunner::run_glsl(const std::string& 
 }
 
 Expected<std::vector<std::uint32_t>> ComputeRunner::run_assembly(const std::string& text, std::uint32_t version) const {
-    std::vector<std::uint32_t> words;
-    std::string problem;
-    spvtools::SpirvTools assembler(version == 0x10300   ? SPV_ENV_VULKAN_1_1
-                                   : version == 0x10400 ? SPV_ENV_VULKAN_1_1_SPIRV_1_4
-                                                        : SPV_ENV_VULKAN_1_3);
-    assembler.SetMessageConsumer([&](spv_message_level_t, const char*, const spv_position_t& at, const char* message) {
-        problem += std::to_string(at.line + 1) + ": " + message + "\n";
-    });
-    if (!assembler.Assemble(text, &words))
-        return fail(ErrorCode::shader_compile, "assemble", "'test'", problem, "Mend the test.");
+    NACRE_TRY(std::vector<std::uint32_t> words,
+              rhi::test::assemble(text, version == 0x10300   ? SPV_ENV_VULKAN_1_1
+                                        : version == 0x10400 ? SPV_ENV_VULKAN_1_1_SPIRV_1_4
+                                                             : SPV_ENV_VULKAN_1_3));
     return run(std::move(words));
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// texelFetch of textures of single words, which compiled code reads without a call, and of others, for which it makes one:
+// texelFetch of textures of one word or two integers, which compiled code reads without a call, and of others, for which it makes one:
 // inside of the texture the texel, everywhere else zero.
 #include <algorithm>
 #include <array>
@@ -31,7 +31,8 @@ struct Content {
 };
 constexpr Content contents[] = {{"r32_uint", rhi::Format::r32_uint, true, 1},
                                 {"r32_float", rhi::Format::r32_float, false, 1},
-                                {"rg32_uint", rhi::Format::rg32_uint, true, 2}};
+                                {"rg32_uint", rhi::Format::rg32_uint, true, 2},
+                                {"rgba32_uint", rhi::Format::rgba32_uint, true, 4}};
 
 std::uint32_t texel_value(std::int32_t x, std::int32_t y, std::int32_t layer, std::int32_t mip, int channel) {
     return static_cast<std::uint32_t>(1 + x + 10 * y + 100 * layer + 1000 * mip + 10000 * channel);
@@ -45,7 +46,7 @@ std::array<std::uint32_t, 4> expected_texel(const Content& content, std::int32_t
         return texel;
     for (int channel = 0; channel < content.channels; ++channel)
         texel[static_cast<std::size_t>(channel)] = texel_value(x, y, layer, level, channel);
-    texel[3] = 1;
+    if (content.channels < 4) texel[3] = 1;
     return texel;
 }
 

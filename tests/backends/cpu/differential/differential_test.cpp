@@ -31,6 +31,7 @@
 
 #include "samples/backends.h"
 #include "tests/backends/cpu/differential/comparison.h"
+#include "tests/core/arguments.h"
 
 namespace nacre::differential {
 namespace {
@@ -224,13 +225,10 @@ int main(int argc, char** argv) {
     if (const char* text = std::getenv("NACRE_DIFFERENTIAL_COUNT")) settings.count = std::strtoull(text, nullptr, 10);
     for (int i = 1; i < argc; ++i) {
         const std::string text = argv[i];
-        const auto value = [&](const char* name) -> std::optional<std::string> {
-            const std::string head = std::string("--") + name + "=";
-            return text.starts_with(head) ? std::optional(text.substr(head.size())) : std::nullopt;
-        };
-        if (const auto seed = value("seed")) settings.seed = std::strtoull(seed->c_str(), nullptr, 10);
-        else if (const auto count = value("count")) settings.count = std::strtoull(count->c_str(), nullptr, 10);
-        else if (const auto workers = value("workers")) settings.workers = std::max(1, std::atoi(workers->c_str()));
+        const auto value = [&](const char* name) { return nacre::test::value_of(text, name); };
+        if (nacre::test::read_number(text, "seed", settings.seed)) continue;
+        if (nacre::test::read_number(text, "count", settings.count)) continue;
+        if (const auto workers = value("workers")) settings.workers = std::max(1, std::atoi(workers->c_str()));
         else if (const auto folder = value("folder")) settings.folder = *folder;
         else if (const auto devices = value("on")) {
             std::istringstream list(*devices);

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "tests/backends/cpu/differential/device_runner.h"
+#include "tests/core/arguments.h"
 
 namespace nacre::differential {
 namespace {
@@ -82,10 +83,8 @@ int main(int argc, char** argv) {
     setenv("NACRE_CACHE_DIR", "off", 1);
     for (int i = 1; i < argc; ++i) {
         const std::string_view argument = argv[i];
-        if (argument.starts_with("--seed="))
-            nacre::differential::settings.seed = std::strtoull(argv[i] + 7, nullptr, 10);
-        if (argument.starts_with("--count="))
-            nacre::differential::settings.count = std::strtoull(argv[i] + 8, nullptr, 10);
+        nacre::test::read_number(argument, "seed", nacre::differential::settings.seed);
+        nacre::test::read_number(argument, "count", nacre::differential::settings.count);
         if (argument == "--together") nacre::differential::settings.together = true;
     }
     return RUN_ALL_TESTS();

@@ -113,17 +113,23 @@ Expected<void> FaultBench::compute(const std::string& path, const std::string& t
     return submit(std::move(list));
 }
 
-rhi::GraphicsPipeline FaultBench::make_graphics(const std::string& path, const std::string& text,
-                                                const std::string& vertex_text, const rhi::VertexBufferLayout& layout,
-                                                std::vector<rhi::VertexAttribute> attributes) {
+rhi::GraphicsPipelineDesc FaultBench::describe_graphics(const std::string& path, const std::string& text,
+                                                        const std::string& vertex_text) {
     rhi::GraphicsPipelineDesc desc;
     desc.vertex = make_shader(vertex_text.empty() ? "whole.vert" : path + ".vert",
                               vertex_text.empty() ? whole_triangle : vertex_text);
     desc.fragment = make_shader(path, text);
-    if (!attributes.empty()) desc.vertex_buffers = {layout};
-    desc.vertex_attributes = std::move(attributes);
     desc.color_targets = {{.format = rhi::Format::rgba32_float}};
     desc.name = path;
+    return desc;
+}
+
+rhi::GraphicsPipeline FaultBench::make_graphics(const std::string& path, const std::string& text,
+                                                const std::string& vertex_text, const rhi::VertexBufferLayout& layout,
+                                                std::vector<rhi::VertexAttribute> attributes) {
+    rhi::GraphicsPipelineDesc desc = describe_graphics(path, text, vertex_text);
+    if (!attributes.empty()) desc.vertex_buffers = {layout};
+    desc.vertex_attributes = std::move(attributes);
     return ok(device_->create_graphics_pipeline(desc));
 }
 

@@ -29,7 +29,9 @@ class FaultBench {
                         rhi::LoadOperation load = rhi::LoadOperation::clear);
     Expected<void> submit(rhi::CommandList list);
     rhi::ComputePipeline make_compute(const std::string& path, const std::string& text);
-    /// Draws to 'target'; the vertex shader covers all of it where no text is given.
+    /// Of a pipeline that draws to 'target'; the vertex shader covers all of it where no text is given.
+    rhi::GraphicsPipelineDesc describe_graphics(const std::string& path, const std::string& text,
+                                                const std::string& vertex_text = {});
     rhi::GraphicsPipeline make_graphics(const std::string& path, const std::string& text,
                                         const std::string& vertex_text = {}, const rhi::VertexBufferLayout& layout = {},
                                         std::vector<rhi::VertexAttribute> attributes = {});

@@ -11,12 +11,12 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <spirv-tools/libspirv.hpp>
 
 #include "rhi/device.h"
 #include "rhi/shader_compiler.h"
 #include "samples/backends.h"
 #include "tests/backends/cpu/hostile/module_runner.h"
+#include "tests/rhi/assembly.h"
 
 namespace nacre::hostile {
 namespace {
@@ -37,16 +37,7 @@ struct ShortWatchdog {
     ~ShortWatchdog() { unsetenv("NACRE_CPU_WATCHDOG_SECONDS"); }
 };
 
-Words assemble(const std::string& text) {
-    Words words;
-    std::string problem;
-    spvtools::SpirvTools assembler(SPV_ENV_VULKAN_1_1);
-    assembler.SetMessageConsumer([&](spv_message_level_t, const char*, const spv_position_t& at, const char* message) {
-        problem += fmt::format("{}: {}\n", at.line + 1, message);
-    });
-    EXPECT_TRUE(assembler.Assemble(text, &words)) << problem;
-    return words;
-}
+Words assemble(const std::string& text) { return ok(rhi::test::assemble(text)); }
 
 class HostileInput : public testing::TestWithParam<const char*> {
   public:

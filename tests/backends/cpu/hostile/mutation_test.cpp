@@ -33,6 +33,7 @@
 #include "tests/backends/cpu/hostile/module_runner.h"
 #include "tests/backends/cpu/hostile/seed_shaders.h"
 #include "tests/backends/cpu/hostile/spirv_mutation.h"
+#include "tests/core/arguments.h"
 
 namespace nacre::hostile {
 namespace {
@@ -260,13 +261,10 @@ int main(int argc, char** argv) {
     testing::InitGoogleTest(&argc, argv);
     for (int i = 1; i < argc; ++i) {
         const std::string text = argv[i];
-        const auto value = [&](const char* name) -> std::optional<std::string> {
-            const std::string head = std::string("--") + name + "=";
-            return text.starts_with(head) ? std::optional(text.substr(head.size())) : std::nullopt;
-        };
-        if (const auto seed = value("seed")) settings.seed = std::strtoull(seed->c_str(), nullptr, 10);
-        else if (const auto count = value("count")) settings.count = std::strtoull(count->c_str(), nullptr, 10);
-        else if (const auto folder = value("folder")) settings.folder = *folder;
+        const auto value = [&](const char* name) { return nacre::test::value_of(text, name); };
+        if (nacre::test::read_number(text, "seed", settings.seed)) continue;
+        if (nacre::test::read_number(text, "count", settings.count)) continue;
+        if (const auto folder = value("folder")) settings.folder = *folder;
         else if (text == "--in-process") settings.in_process = true;
         else if (text == "--chains") settings.chains = true;
         else if (const auto file = value("run")) return run_file(*file);

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/backends/cpu/hostile/seed_shaders.h"
 
-#include <spirv-tools/libspirv.hpp>
-
 #include "rhi/shader_compiler.h"
+#include "tests/rhi/assembly.h"
 
 namespace nacre::hostile {
 namespace {
@@ -457,10 +456,7 @@ Expected<std::vector<SeedShader>> seed_shaders() {
         NACRE_TRY(rhi::ShaderDesc desc, compiler.compile({.path = seed.path, .text = seed.text}));
         made.push_back({seed.path, desc.stage, std::move(desc.spirv)});
     }
-    std::vector<std::uint32_t> words;
-    spvtools::SpirvTools assembler(SPV_ENV_VULKAN_1_1);
-    if (!assembler.Assemble(assembled_seed, &words))
-        return fail(ErrorCode::shader_compile, "assemble", "'pointers'", "the text is wrong", "Mend the test.");
+    NACRE_TRY(std::vector<std::uint32_t> words, rhi::test::assemble(assembled_seed));
     made.push_back({"pointers.comp", rhi::ShaderStage::compute, std::move(words)});
     return made;
 }

@@ -225,6 +225,41 @@ TEST_P(Sampling, FiltersAnisotropically) {
     }
 }
 
+// The reference averages over the same ellipses. A texel's weight may be that of the step below or above where a
+// distance rounds otherwise (1/512 of it), and another level may be taken where the logarithm is a whole number.
+TEST_P(Sampling, AveragesTheSameEllipsesInDouble) {
+    const Shape& shape = GetParam();
+    if (shape.dimension != ViewDimension::d2 && shape.dimension != ViewDimension::d2_array) return;
+    std::size_t compared = 0, different = 0, far = 0, longer = 0;
+    for (int i = 0; i < 24; ++i) {
+        rhi::SamplerDesc desc = random_sampler();
+        desc.max_anisotropy = random_float(random, 1.5f, 16.0f);
+        desc.comparison = false;
+        const TestImage image({Format::rgba32_float, shape.dimension, shape.width, shape.height, 1, shape.layers, 3},
+                              random);
+        const SamplerState ellipses{desc, true}, lines{desc, false};
+        const Request request{.flags = flags_of(ImageOperation::sample) |
+                                       (i % 2 == 0 ? image_lod_implicit : image_lod_gradient) |
+                                       (i % 3 == 0 ? image_offset : 0u)};
+        const std::vector<Point> points = random_quads(50);
+        const auto single = run_points(image_function(8), 8, &image.view, &ellipses, request, points);
+        const auto along_lines = run_points(image_function(8), 8, &image.view, &lines, request, points);
+        const auto precise = run_points_in_double(&image.view, &ellipses, request, points);
+        for (std::size_t p = 0; p < points.size(); ++p)
+            for (std::size_t c = 0; c < 4; ++c) {
+                const double expected = static_cast<double>(std::bit_cast<float>(single[p][c]));
+                const double difference = std::abs(precise[p][c] - expected);
+                ++compared;
+                if (!(difference <= 1e-4)) ++different;
+                if (!(difference <= 1e-2)) ++far;
+                longer += std::abs(static_cast<double>(std::bit_cast<float>(along_lines[p][c])) - expected) > 0.1;
+            }
+    }
+    EXPECT_GT(longer, compared / 20) << "the other filter gives the same: nothing is told apart";
+    EXPECT_LE(different, compared / 50) << "of " << compared;
+    EXPECT_LE(far, compared / 500) << "of " << compared;
+}
+
 // What gather returns are the texels of a linear sample: weighted, they are that sample.
 TEST_P(Sampling, GathersTheTexelsOfLinearSamples) {
     const Shape& shape = GetParam();

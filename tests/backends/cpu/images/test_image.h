@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <random>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "backends/cpu/image_view.h"
+#include "backends/cpu/images/double_operations.h"
 #include "backends/cpu/images/image_operations.h"
 #include "backends/cpu/images/texel_formats.h"
 #include "rhi/resources.h"
@@ -151,6 +153,34 @@ inline std::vector<Result> run_points(NacreCpuImageFunction function, std::uint3
         for (std::size_t lane = 0; lane < count; ++lane) {
             for (int c = 0; c < 4; ++c) results[first + lane][c] = arguments.result[c][lane];
         }
+    }
+    return results;
+}
+
+/// The same in double precision, where the result is not rounded.
+inline std::vector<std::array<double, 4>> run_points_in_double(const ImageView* image, const SamplerState* sampler,
+                                                               const Request& request, std::span<const Point> points) {
+    constexpr std::size_t lanes = max_lanes;
+    std::vector<std::array<double, 4>> results(points.size());
+    DoubleImageArguments arguments{};
+    for (std::size_t first = 0; first < points.size(); first += lanes) {
+        const std::size_t count = std::min(lanes, points.size() - first);
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            const Point& point = points[first + std::min(lane, count - 1)];
+            for (std::size_t i = 0; i < 4; ++i)
+                arguments.coordinates[i][lane] = std::bit_cast<float>(point.coordinates[i]);
+            arguments.lod[lane] = point.lod, arguments.reference[lane] = point.reference;
+            for (std::size_t i = 0; i < 3; ++i) {
+                arguments.gradient_x[i][lane] = point.gradient_x[i];
+                arguments.gradient_y[i][lane] = point.gradient_y[i];
+                arguments.offset[i][lane] = point.offset[i];
+            }
+            arguments.min_lod[lane] = point.min_lod;
+        }
+        double_image_function()(image, sampler, &arguments, request.flags,
+                                static_cast<std::uint32_t>((1ull << count) - 1));
+        for (std::size_t lane = 0; lane < count; ++lane)
+            for (std::size_t c = 0; c < 4; ++c) results[first + lane][c] = arguments.result[c][lane];
     }
     return results;
 }

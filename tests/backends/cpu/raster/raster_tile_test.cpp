@@ -117,6 +117,37 @@ TEST_P(SmallTriangles, AreTestedPixelByPixel) {
     }
 }
 
+/// What waits for the fragment function, quads in one place and whole blocks in another, still knows its triangle when
+/// many others have been drawn.
+TEST(WholeBlocks, KeepTheirTriangleWhileOthersAreDrawn) {
+    constexpr std::uint32_t others = 300;
+    for (const std::uint32_t lanes : {8u, 16u})
+        for (const bool whole_waits : {false, true}) {
+            TestImage color(Format::r32_uint, width, height);
+            Bench bench(width, height, {&color}, nullptr, {.lanes = lanes});
+            bench.use<TestShader::primitive_id>(1);
+            // Two blocks: pixels of the left one are covered one by one, all of the right one at once.
+            bench.state.scissor = {0, 0, 8, 4};
+            std::vector<TestVertex> vertices;
+            for (std::uint32_t triangle = 0; triangle <= others; ++triangle) {
+                const bool is_whole = (triangle == 0) == whole_waits;
+                const double pixel[3][2] = {{1.0, 1.0}, {2.5, 1.0}, {1.0, 2.5}};
+                const double half[3][2] = {{4.0, -400.0}, {400.0, 0.0}, {4.0, 400.0}};
+                for (const auto& corner : is_whole ? half : pixel)
+                    vertices.push_back(at_window(corner[0], corner[1], width, height));
+            }
+            bench.draw(vertices);
+            bench.end();
+            for (std::uint32_t y = 0; y < 4; ++y)
+                for (std::uint32_t x = 0; x < 8; ++x) {
+                    const bool is_pixel = x == 1 && y == 1;
+                    if (x < 4 && !is_pixel) continue;
+                    const std::uint32_t expected = (x >= 4) == whole_waits ? 1 : others + 1;
+                    ASSERT_EQ(color.at<std::uint32_t>(x, y), expected) << lanes << whole_waits << ": " << x << ", " << y;
+                }
+        }
+}
+
 /// A texel of some bytes that are all different.
 std::array<std::byte, 16> texel_of(std::uint32_t seed) {
     std::array<std::byte, 16> texel;
