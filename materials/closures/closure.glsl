@@ -167,6 +167,10 @@ struct Closure {
     float view_cosine;      // outside
     SpecularLobe again;     // what the layers above have thrown back to the lobe, once or more often
     vec3 again_view;        // what that lobe is seen from
+    vec3 ring_albedo;       // of what of it comes from all around
+    vec3 ring;              // the same times what makes ring_density a density
+    float ring_spread;      // squared width of the lobe in tangential components
+    vec2 ring_lean;         // away from where it is bright
     float diffuse_scale;    // one over the share of the diffuse light that leaves what lies above
     float lambert_scale;    // the same for the light of media
     float again_probability;
@@ -399,6 +403,9 @@ Closure with_probabilities(Closure closure) {
 #ifdef NACRE_SLAB_MEDIUM
     if ((closure.features & slab_medium) != 0u) diffuse += closure.thin + closure.subsurface;
 #endif
+#ifdef NACRE_CLOSURE_COVERED
+    if (closure.ior_excess > 0.0) diffuse += closure.ring_albedo;
+#endif
     result.specular_probability = largest(closure.specular.albedo);
     result.diffuse_probability = largest(diffuse);
     float sum = result.specular_probability + result.diffuse_probability;
@@ -539,6 +546,10 @@ Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprin
     closure.view_cosine = closure.view.z;
     closure.again = scaled_lobe(closure.specular, vec3(0.0));
     closure.again_view = closure.view;
+    closure.ring_albedo = vec3(0.0);
+    closure.ring = vec3(0.0);
+    closure.ring_spread = 1.0;
+    closure.ring_lean = vec2(0.0);
     closure.diffuse_scale = 1.0;
     closure.lambert_scale = 1.0;
 #endif
@@ -563,6 +574,7 @@ struct LeavingShares {
     float first;
     float second;
     float later;
+    float partly;  // of what does not leave by the first, what was not reflected totally
 };
 
 // In the plane of tangential components a GGX lobe is about a distribution w^2 / (pi (w^2 + x^2)^2) around the mirrored
@@ -595,7 +607,8 @@ LeavingShares leaving_shares(float alpha, float view_cosine, float ior) {
     float partly = f0 + (1.0 - f0) * power5(1.0 - cosine);
     partly *= shares.first / (1.0 - partly);
     float back = max(1.0 - shares.first, 1e-6);
-    shares.second = mix(returning, shares.first, min(partly / back, 1.0));
+    shares.partly = min(partly / back, 1.0);
+    shares.second = mix(returning, shares.first, shares.partly);
     shares.later = mix(1.0, mix(0.12, wide, 1.0 - exp(-pow(3.6 * alpha, 1.8))), dense);
     return shares;
 }
@@ -628,18 +641,33 @@ float leaving_density(float cosine, float inner_cosine, float ior) {
     return 2.0 / ior * (across * across + along * along);
 }
 
-// Of a lobe that is seen from beyond the angle of total reflection, by the sine that the view would have outside: the
-// same closed form, mended for views as cover_closure tilts them, within 0.02.
+// Of a lobe that is seen from about the angle of total reflection or beyond it, by the squared sine that the view would
+// have outside, from 0.81: the same closed form, mended for such views, within 0.01 at index 1.5 and alpha from 0.07.
 float tilted_leaving_share(float alpha, float sine2, float ior) {
-    float width = 0.0022 + square(2.0 * alpha * ior) * pow(max(1.0 - sine2 / (ior * ior), 0.0), 1.074);
-    float around = width + sine2 - 0.9511;
-    float side = around * inversesqrt(around * around + 3.8044 * width);
+    float width = 0.00131 + square(2.0 * alpha * ior) * pow(max(1.0 - sine2 / (ior * ior), 0.0), 1.237);
+    float around = width + sine2 - 0.9908;
+    float side = around * inversesqrt(around * around + 3.9632 * width);
     float odds = log((1.0 - side) / (1.0 + side));
     float root = sqrt(alpha);
     float index = ior - 1.5;
-    odds = 0.4861 + odds * (2.2552 + 0.2869 * odds - 1.1758 * root + 0.0732 * index) +
-           root * (2.3905 - 2.5617 * root - 2.0998 * index) + index * (-0.117 + 0.8901 * index);
+    odds = 0.1141 + odds * (1.286 - 0.0295 * odds - 1.1831 * root - 0.2635 * sine2 - 0.3927 * index) +
+           root * (2.8025 - 3.4367 * root + 0.7464 * sine2 - 3.5865 * index) + index * (0.87 - 0.3729 * sine2) -
+           sine2 * (1.0435 + 0.0145 * sine2);
     return max(1.0 / (1.0 + exp(-odds)), 0.02);
+}
+
+// What was reflected totally comes from all around the directions that leave. If it lay there evenly, what a lobe sends
+// into one of them were the part of the lobe that lies outside: (1 + s) / 2 by the closed form of leaving_shares. There is
+// more of it where the lobe looks. Over Lambert's value; spread: squared width of the lobe; lean: of length 1 or less.
+float ring_density(vec3 light, float spread, vec2 lean) {
+    float around = spread - light.z * light.z;
+    return (1.0 + around * inversesqrt(around * around + 4.0 * spread)) * max(1.0 - light.x * lean.x - light.y * lean.y, 0.0);
+}
+
+// One over the mean of ring_density over the diffuse light that leaves: in closed form without Fresnel's equations,
+// which take more along the rim (a fit within 0.02).
+float ring_scale(float width) {
+    return (width + sqrt(width * width + 4.0)) * (1.0 + 0.018 / (width + 0.015)) / (4.0 * width);
 }
 
 // A closure that is seen through layers, prepared for the view inside. spread: share of what its specular lobes send
@@ -674,27 +702,33 @@ Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior_excess,
         vec3 sum = vec3(once) + thrown;
         vec3 share = thrown / sum;
         if (closure.specular.is_mirror) share = vec3(0.0);
-        // Most of it was reflected totally, and leaves by a lobe around what lies beyond that angle; seen from above,
-        // in a ring, for which diffuse light stands. Width and place by random walks.
+        // What was reflected totally leaves by a lobe around what lies beyond that angle, and in a ring around the normal
+        // that is brightest along its rim; the rest by a wider lobe around the mirrored view. Widths and shares by random
+        // walks between a lobe and a smooth interface.
         float sine = ior * sqrt(closure.view.x * closure.view.x + closure.view.y * closure.view.y);
-        float aside = 1.0 - square(1.0 - min(3.0 * sine, 1.0));
-        float tilt = aside * (1.0 + min(1.5 * ior * alpha, 0.5 * ior_excess));
+        float aside = saturated(4.5 * sine - 0.8) * saturated(2.0 - 3.3 * shares.partly);
+        float tilt = mix(sine, 1.0 + min(1.4 * ior * alpha, 0.4 * ior_excess), aside);
         float stretch = tilt / max(sine, 1e-6);
         float inside = tilt / ior;
         covered.again_view = vec3(closure.view.x * stretch, closure.view.y * stretch,
                                   sqrt(max(1.0 - inside * inside, 1e-6)));
         covered.again = covered.specular;
-        covered.again.alpha =
-            min(closure.specular.alpha * (1.4 + 1.8 * square(square(covered.view_cosine))), vec2(1.0));
+        covered.again.alpha = min(closure.specular.alpha * (0.95 + 1.1 * square(covered.view_cosine)), vec2(1.0));
         covered.again.area = covered.again.alpha.x * covered.again.alpha.y;
         covered.again.view_length = ggx_stretched_length(covered.again_view, covered.again.alpha);
-        alpha = sqrt(covered.again.area);
-        float leaving = mix(leaving_shares(alpha, covered.view_cosine, ior).first,
-                            tilted_leaving_share(alpha, tilt * tilt, ior), aside);
-        float ring = 0.05 + 0.4 * power6(covered.view_cosine);
+        float area = alpha * alpha;
+        float wide = sqrt(covered.again.area);
+        float leaving = mix(leaving_shares(wide, sqrt(max(1.0 - tilt * tilt, 0.0)), ior).first,
+                            tilted_leaving_share(wide, max(tilt * tilt, 0.81), ior), saturated(5.0 * tilt - 4.5));
+        float ring = min(0.6 * area / (area + 0.017) +
+                             0.6 * area / (area + 0.012) * square(square(square(covered.view_cosine))),
+                         0.7);
         covered.again.albedo = covered.specular.albedo * share * (1.0 - ring);
-        covered.diffuse += covered.specular.albedo * share * ring;
-        float single = 1.0 - ggx_albedo(covered.again_view.z, alpha).missing;
+        covered.ring_albedo = covered.specular.albedo * share * ring;
+        covered.ring_spread = 1.7 * area * ior * ior;
+        covered.ring_lean = vec2(closure.view.x, closure.view.y) * (ior * min(1.8, 1.0 / max(sine, 1e-6)));
+        covered.ring = covered.ring_albedo * ring_scale(sqrt(covered.ring_spread));
+        float single = 1.0 - ggx_albedo(covered.again_view.z, wide).missing;
         vec3 peak = covered.again.albedo / (single * leaving);
 #ifdef NACRE_CLOSURE_CURVES
         covered.again.reflectance.normal = peak;
@@ -789,6 +823,8 @@ ClosureValue evaluate_closure_above(Closure closure, vec3 outside) {
         value.specular = (value.specular + again_value(closure, light)) * leaving;
         diffuse_scale = leaving * closure.diffuse_scale;
         lambert_scale = leaving * closure.lambert_scale;
+        value.specular += closure.ring * (lambert_scale * light.z * inverse_pi *
+                                          ring_density(outside, closure.ring_spread, closure.ring_lean));
     }
 #endif
 #ifdef NACRE_SLAB_SPECULAR_LUT
@@ -980,6 +1016,10 @@ ClosureAlbedo closure_albedo(Closure closure) {
     if (closure.ior_excess > 0.0) albedo.specular += closure.again.albedo;
 #endif
     albedo.diffuse = closure.diffuse;
+#ifdef NACRE_CLOSURE_COVERED
+    // Surroundings look like diffuse light to it.
+    if (closure.ior_excess > 0.0) albedo.diffuse += closure.ring_albedo;
+#endif
     albedo.transmission = vec3(0.0);
 #ifdef NACRE_SLAB_MEDIUM
     if ((closure.features & slab_medium) != 0u) {

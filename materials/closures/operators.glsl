@@ -90,7 +90,9 @@ struct Matter {
     float alpha2;             // squared GGX alpha of that lobe, as it is seen from directly above
     float ior;                // against what lies above
     float bend;               // 1 - 1 / ior^2 of what `transmittance` lies in: how directions turn towards the normal
-    vec3 scattered;           // of light that passes, share that was scattered, and not only forwards
+    // Of light that is mirrored below and seen in the view direction, the share that was scattered on its way down or up,
+    // and not only forwards.
+    vec3 scattered;
     float cos_view;           // of the view as it comes from above
 };
 
@@ -259,7 +261,7 @@ Matter base_matter(Slab slab, float cos_view) {
         albedo = min(reflected * leaving * between, vec3(1.0));
         passed = through * between;
         lost = absorbed * between;
-        m.scattered = scattered * (1.0 - max(slab.phase_anisotropy, 0.0));
+        m.scattered = scattered;
         m.transmittance =
             exp(log(clamp(through / max(medium.kept, vec3(1e-30)), vec3(1e-30), vec3(1.0))) * mean_cosine);
     }
@@ -294,7 +296,20 @@ Matter base_matter(Slab slab, float cos_view) {
 // A slab as what lies below and around it sees it.
 Matter slab_matter(Slab slab, Closure closure) {
     Matter m = base_matter(slab, closure.view.z);
-    m.view_transmittance = closure_throughput(closure) + closure_albedo(closure).transmission;
+    vec3 straight = closure_throughput(closure);
+    vec3 through = closure_albedo(closure).transmission;
+    m.view_transmittance = straight + through;
+#ifdef NACRE_SLAB_MEDIUM
+    if ((slab.features & slab_medium) != 0u) {
+        // Up by the view's own share. Down it comes at the same angle: what goes straight falls with the way's length.
+        vec3 up = through / max(m.view_transmittance, vec3(1e-30));
+        float way = mean_cosine / max(refracted_cosine(closure.view.z, closure.reflectance), 0.01);
+        vec3 down = vec3(exponential_rest(minus_log_rest(m.scattered.x) * way),
+                         exponential_rest(minus_log_rest(m.scattered.y) * way),
+                         exponential_rest(minus_log_rest(m.scattered.z) * way));
+        m.scattered = either(up, down) * (1.0 - max(slab.phase_anisotropy, 0.0));
+    }
+#endif
     return m;
 }
 
@@ -463,8 +478,7 @@ Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     vec3 by = beside / max(sum, vec3(1e-30));
     Path above;
     above.weight = path.weight * sum;
-    // Scattered on its way to the base or on its way back.
-    above.spread = either(path.spread, either(top.scattered, top.scattered) * through / max(sum, vec3(1e-30)));
+    above.spread = either(path.spread, top.scattered * through / max(sum, vec3(1e-30)));
     above.ior_excess = widening.ior_excess;
     above.uncovered = path.uncovered * by;
     // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
