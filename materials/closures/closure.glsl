@@ -45,7 +45,7 @@
 //
 // With NACRE_CLOSURE_COVERED (materials/closures/operators.glsl defines it) closures may be seen through layers. They
 // are prepared for the view as it goes on inside; the lights are those outside, as ever:
-//     Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior_excess, float view_cosine)
+//     Closure cover_closure(Closure closure, Cover cover)
 //
 // Who includes this provides the tables (materials/closures/tables.glsl, medium.glsl) and, where a slab may have
 // slab_specular_lut, vec3 specular_lut(uint index, vec2 at): the tint by the cosines of view and light to the normal.
@@ -147,6 +147,9 @@ struct Closure {
 #ifdef NACRE_SLAB_MEDIUM
     vec3 subsurface;    // albedo of what leaves beyond the footprint
     vec3 thin;          // albedo of what a medium that is not opaque scatters back
+    float thin_way;     // shape of that: thin_density
+    float thin_scale;
+    float bend;         // 1 - 1 / index^2 of the medium
     vec3 transmission;  // what it scatters through
     vec3 straight;      // what passes it without an event
     vec3 depth;         // optical, along the normal
@@ -171,6 +174,12 @@ struct Closure {
     vec3 ring;              // the same times what makes ring_density a density
     float ring_spread;      // squared width of the lobe in tangential components
     vec2 ring_lean;         // away from where it is bright
+    vec3 entering;          // what the interface lets through to the medium
+    float veil;             // what the medium above takes of a lobe's light on its way down: optical depth
+    float veil_bend;        // 1 - 1 / index^2 of that medium
+    vec3 scattered;         // albedo of what does not come along the lobes, for that
+    float scattered_way;    // its shape: thin_density
+    float scattered_scale;
     float diffuse_scale;    // one over the share of the diffuse light that leaves what lies above
     float lambert_scale;    // the same for the light of media
     float again_probability;
@@ -396,6 +405,21 @@ MediumScattering slab_scattering(Slab slab, float cosine) {
 }
 #endif
 
+// What a thin medium scatters once comes along the surface more than Lambert's: light and view cross it at
+// their angles, (1 - exp(-d (1 / v + 1 / l))) l / (l + v) (Chandrasekhar 1960, "Radiative transfer"), with x / (1 + x)
+// for 1 - exp(-x). Over Lambert's value, without its scale. way: by depth and cosine of the view.
+float thin_density(float cosine, float bend, float way) {
+    return 1.0 / (sqrt(bend + cosine * cosine * (1.0 - bend)) + way);
+}
+
+float thin_way(float depth, float view_cosine) { return depth * view_cosine / (depth + view_cosine) + 0.04; }
+
+// One over the mean of thin_density over diffuse light.
+float thin_scale(float bend, float way) {
+    float least = 1.0 / (1.0 + sqrt(bend));
+    return 0.5 / (least - way * minus_log_rest((1.0 - bend) * least / (1.0 + way)) / (1.0 - bend));
+}
+
 // The closure with the probabilities by which its lobes are sampled: by what each sends to the view.
 Closure with_probabilities(Closure closure) {
     Closure result = closure;
@@ -404,6 +428,7 @@ Closure with_probabilities(Closure closure) {
     if ((closure.features & slab_medium) != 0u) diffuse += closure.thin + closure.subsurface;
 #endif
 #ifdef NACRE_CLOSURE_COVERED
+    diffuse += closure.scattered;
     if (closure.ior_excess > 0.0) diffuse += closure.ring_albedo;
 #endif
     result.specular_probability = largest(closure.specular.albedo);
@@ -525,6 +550,9 @@ Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprin
                              optical_depth(slab.mean_free_path.y, slab.thickness),
                              optical_depth(slab.mean_free_path.z, slab.thickness));
         float inside = refracted_cosine(closure.view.z, closure.reflectance);
+        closure.bend = refraction_bend(medium_ior_excess(closure.reflectance));
+        closure.thin_way = thin_way(dot(closure.depth, vec3(1.0 / 3.0)), inside);
+        closure.thin_scale = thin_scale(closure.bend, closure.thin_way);
         vec3 leaving = internal_transmittance(slab);
         MediumScattering medium = slab_scattering(slab, inside);
         MediumScattering again = slab_scattering(slab, mean_cosine);
@@ -544,6 +572,12 @@ Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprin
 #ifdef NACRE_CLOSURE_COVERED
     closure.ior_excess = 0.0;
     closure.view_cosine = closure.view.z;
+    closure.entering = entering;
+    closure.veil = 0.0;
+    closure.veil_bend = 0.0;
+    closure.scattered = vec3(0.0);
+    closure.scattered_way = 1.0;
+    closure.scattered_scale = 1.0;
     closure.again = scaled_lobe(closure.specular, vec3(0.0));
     closure.again_view = closure.view;
     closure.ring_albedo = vec3(0.0);
@@ -670,32 +704,73 @@ float ring_scale(float width) {
     return (width + sqrt(width * width + 4.0)) * (1.0 + 0.018 / (width + 0.015)) / (4.0 * width);
 }
 
-// A closure that is seen through layers, prepared for the view inside. spread: share of what its specular lobes send
-// that does not come along them, but as diffuse light does, having been scattered on its way. kept: of light that goes
-// up and down once more, what the medium above leaves. ior_excess: index - 1 of what lies above, against what the view
-// and the lights outside are in.
-// view_cosine: outside.
-Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior_excess, float view_cosine) {
+// What lies above a closure, as the view sees it.
+struct Cover {
+    vec3 spread;        // share of what the lobes send that was scattered on its way down or up
+    vec3 mean;          // what the closure's interface reflects of diffuse light
+    vec3 kept;          // of light that goes up and down once more, what the medium above leaves
+    float bend;         // 1 - 1 / index^2 of the medium that scatters
+    float ior_excess;   // index - 1 of what lies directly above, against what the view and the lights outside are in
+    float view_cosine;  // outside
+};
+
+// What a scattering medium leaves of a lobe's light on its straight way down.
+float veil_transmittance(Closure closure, float cosine) {
+    return exp(-closure.veil *
+               inversesqrt(max(closure.veil_bend + cosine * cosine * (1.0 - closure.veil_bend), 1e-4)));
+}
+
+// The same for all of a lobe. Lobes are wide outside, and none of their light comes from below.
+float lobe_veil(Closure closure, SpecularLobe lobe, float view_cosine) {
+    float width = lobe.is_mirror ? 0.0 : min(2.7 * sqrt(lobe.area) * (1.0 + closure.ior_excess), 1.0);
+    return veil_transmittance(closure, sqrt(mix(view_cosine * view_cosine, 0.45, width)));
+}
+
+// A closure that is seen through layers, prepared for the view inside. What is scattered on its way does not come along
+// the lobes, but as diffuse light does, and meets the interface like it.
+Closure cover_closure(Closure closure, Cover cover) {
     Closure covered = closure;
-    vec3 sharp = vec3(1.0) - spread;
+    float ior_excess = cover.ior_excess;
+    // Down and up are alike for light that is mirrored.
+    vec3 straight = vec3(sqrt(1.0 - min(cover.spread.x, 1.0)), sqrt(1.0 - min(cover.spread.y, 1.0)),
+                         sqrt(1.0 - min(cover.spread.z, 1.0)));
+    vec3 up = cover.spread / (vec3(1.0) + straight);
+    float bend = cover.bend;
+    float slant = sqrt(bend + cover.view_cosine * cover.view_cosine * (1.0 - bend));
+    covered.veil = 0.5 * minus_log_rest(dot(cover.spread, vec3(1.0 / 3.0))) * max(slant, 0.01);
+    covered.veil_bend = bend;
     vec3 specular = closure.specular.albedo;
-    covered.specular = scaled_lobe(closure.specular, sharp);
+    covered.specular = scaled_lobe(closure.specular, straight);
 #ifdef NACRE_SLAB_SECOND_LOBE
     if ((closure.features & slab_second_lobe) != 0u) {
         specular += closure.second.albedo;
-        covered.second = scaled_lobe(closure.second, sharp);
+        covered.second = scaled_lobe(closure.second, straight);
     }
 #endif
-    covered.diffuse += specular * spread;
+    vec3 whole = specular + closure.entering;
+    vec3 entering = mix(vec3(1.0), whole * (vec3(1.0) - cover.mean) / max(closure.entering, vec3(1e-30)), up);
+    covered.diffuse = closure.diffuse * entering + up * whole * cover.mean;
+    covered.scattered_way = covered.veil + 0.04;
+    covered.scattered_scale = thin_scale(bend, covered.scattered_way);
+#ifdef NACRE_SLAB_MEDIUM
+    if ((closure.features & slab_medium) != 0u) {
+        covered.thin *= entering;
+        covered.subsurface *= entering;
+        covered.transmission *= entering;
+        covered.straight *= entering;
+        covered.thin_scale = thin_scale(either(closure.bend, refraction_bend(ior_excess)), closure.thin_way);
+    }
+#endif
     covered.ior_excess = ior_excess;
-    covered.view_cosine = max(view_cosine, smallest_cosine);
+    covered.view_cosine = max(cover.view_cosine, smallest_cosine);
+    float again_cosine = covered.view_cosine;
     if (ior_excess > 0.0) {
         float ior = 1.0 + ior_excess;
         float alpha = sqrt(closure.specular.area);
         LeavingShares shares = leaving_shares(alpha, covered.view_cosine, ior);
         float once = shares.first;
         // Thrown back once, and again and again.
-        vec3 reflected = min(specular, vec3(1.0)) * kept;
+        vec3 reflected = min(specular, vec3(1.0)) * cover.kept;
         vec3 thrown = reflected * (1.0 - once);
         thrown *= vec3(shares.second) + reflected * ((1.0 - shares.second) * shares.later) /
                                             (vec3(1.0) - reflected * (1.0 - shares.later));
@@ -708,6 +783,7 @@ Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior_excess,
         float sine = ior * sqrt(closure.view.x * closure.view.x + closure.view.y * closure.view.y);
         float aside = saturated(4.5 * sine - 0.8) * saturated(2.0 - 3.3 * shares.partly);
         float tilt = mix(sine, 1.0 + min(1.4 * ior * alpha, 0.4 * ior_excess), aside);
+        again_cosine = sqrt(max(1.0 - tilt * tilt, 0.0));
         float stretch = tilt / max(sine, 1e-6);
         float inside = tilt / ior;
         covered.again_view = vec3(closure.view.x * stretch, closure.view.y * stretch,
@@ -718,7 +794,7 @@ Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior_excess,
         covered.again.view_length = ggx_stretched_length(covered.again_view, covered.again.alpha);
         float area = alpha * alpha;
         float wide = sqrt(covered.again.area);
-        float leaving = mix(leaving_shares(wide, sqrt(max(1.0 - tilt * tilt, 0.0)), ior).first,
+        float leaving = mix(leaving_shares(wide, again_cosine, ior).first,
                             tilted_leaving_share(wide, max(tilt * tilt, 0.81), ior), saturated(5.0 * tilt - 4.5));
         float ring = min(0.6 * area / (area + 0.017) +
                              0.6 * area / (area + 0.012) * square(square(square(covered.view_cosine))),
@@ -755,6 +831,25 @@ Closure cover_closure(Closure closure, vec3 spread, vec3 kept, float ior_excess,
         covered.lambert_scale = 1.0 / leaving_mean(ior);
         covered.diffuse_scale =
             covered.lambert_scale / mix(1.0, diffuse_below(closure, ior), saturated(5.0 * ior_excess));
+    }
+    if (covered.veil > 0.0) {
+        float down = lobe_veil(covered, covered.specular, cover.view_cosine);
+        covered.scattered = covered.specular.albedo * (1.0 - down);
+        covered.specular.albedo *= down;
+        down = lobe_veil(covered, covered.again, again_cosine);
+        covered.scattered += covered.again.albedo * (1.0 - down);
+        covered.again.albedo *= down;
+        // Most of the ring lies along the rim.
+        down = veil_transmittance(covered, 0.45);
+        covered.scattered += covered.ring_albedo * (1.0 - down);
+        covered.ring_albedo *= down;
+#ifdef NACRE_SLAB_SECOND_LOBE
+        if ((closure.features & slab_second_lobe) != 0u) {
+            down = lobe_veil(covered, covered.second, cover.view_cosine);
+            covered.scattered += covered.second.albedo * (1.0 - down);
+            covered.second.albedo *= down;
+        }
+#endif
     }
     return with_probabilities(covered);
 }
@@ -826,6 +921,7 @@ ClosureValue evaluate_closure_above(Closure closure, vec3 outside) {
         value.specular += closure.ring * (lambert_scale * light.z * inverse_pi *
                                           ring_density(outside, closure.ring_spread, closure.ring_lean));
     }
+    if (closure.veil > 0.0) value.specular *= veil_transmittance(closure, outside.z);
 #endif
 #ifdef NACRE_SLAB_SPECULAR_LUT
     if ((closure.features & slab_specular_lut) != 0u)
@@ -850,10 +946,14 @@ ClosureValue evaluate_closure_above(Closure closure, vec3 outside) {
 #ifdef NACRE_CLOSURE_COVERED
     value.diffuse *= diffuse_scale;
     lambert *= lambert_scale;
+    if (closure.veil > 0.0)
+        value.diffuse += closure.scattered * (outside.z * inverse_pi * closure.scattered_scale *
+                                              thin_density(outside.z, closure.veil_bend, closure.scattered_way));
 #endif
 #ifdef NACRE_SLAB_MEDIUM
     if ((closure.features & slab_medium) != 0u) {
-        value.diffuse += closure.thin * lambert;
+        value.diffuse += closure.thin * (lambert * closure.thin_scale *
+                                         thin_density(light.z, closure.bend, closure.thin_way));
         value.subsurface = closure.subsurface * lambert;
     }
 #endif
@@ -1018,6 +1118,7 @@ ClosureAlbedo closure_albedo(Closure closure) {
     albedo.diffuse = closure.diffuse;
 #ifdef NACRE_CLOSURE_COVERED
     // Surroundings look like diffuse light to it.
+    albedo.diffuse += closure.scattered;
     if (closure.ior_excess > 0.0) albedo.diffuse += closure.ring_albedo;
 #endif
     albedo.transmission = vec3(0.0);

@@ -53,10 +53,6 @@ vec3 view_below(vec3 view, Widening widening) { return refracted_direction(view,
 // "Authoring Materials that matter", SIGGRAPH 2023; the formulae are ours. Any subtree counts as one piece of matter
 // whose parts lie independently of each other, so that a slab yields one closure whatever is above it.
 
-// 1 - (1 - a)(1 - b), for what happens here or there, with all digits where both are small.
-float either(float a, float b) { return a + b * (1.0 - a); }
-vec3 either(vec3 a, vec3 b) { return a + b * (vec3(1.0) - a); }
-
 // How much what is seen through a subtree spreads. Known before any closure is, since closures depend on it.
 struct Spread {
     float coverage;
@@ -261,7 +257,8 @@ Matter base_matter(Slab slab, float cos_view) {
         albedo = min(reflected * leaving * between, vec3(1.0));
         passed = through * between;
         lost = absorbed * between;
-        m.scattered = scattered;
+        // Of light from all around on its way down, that which is thrown back counts as well.
+        m.scattered = either(scattered, medium.reflected);
         m.transmittance =
             exp(log(clamp(through / max(medium.kept, vec3(1e-30)), vec3(1e-30), vec3(1.0))) * mean_cosine);
     }
@@ -472,7 +469,12 @@ Path path_through_mix(Path path, float amount) {
 Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     vec3 beside = vec3(top.bare);
     Bounces bounces = bounces_between(top, base);
-    vec3 through = top.coverage * top.view_transmittance * bounces.leaving;
+    // What was scattered above is diffuse light here.
+    vec3 kept_straight = vec3(1.0) - path.spread;
+    vec3 diffuse_share = path.spread / (vec3(1.0) + vec3(sqrt(max(kept_straight.x, 0.0)), sqrt(max(kept_straight.y, 0.0)),
+                                                         sqrt(max(kept_straight.z, 0.0))));
+    vec3 through =
+        top.coverage * mix(top.view_transmittance, top.passed, diffuse_share) * bounces.leaving;
     vec3 sum = beside + through;
     // Where nothing comes through the rest does not matter.
     vec3 by = beside / max(sum, vec3(1e-30));
@@ -493,20 +495,27 @@ Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     return above;
 }
 
-// A closure that was prepared for the view refracted by path.ior_excess, under all that lies above it. view_cosine:
-// outside.
-Closure closure_below_path(Closure closure, Path path, float view_cosine) {
+// A closure of a slab that was prepared for the view refracted by path.ior_excess, under all that lies above it.
+// view_cosine: outside.
+Closure closure_below_path(Closure closure, Slab slab, Path path, float view_cosine) {
+    Cover cover;
+    cover.spread = path.spread;
+    cover.mean = fresnel_mean(slab_fresnel(slab));
     // Light that is thrown back goes through the medium that is as dense as what lies directly above, not through what
     // lies above that.
     float dense = saturated(path.bend / max(refraction_bend(path.ior_excess), 1e-6));
     vec3 twice = exp(log(max(path.transmittance, vec3(1e-30))) * (2.0 / max(closure.view.z, 0.1)));
-    vec3 kept = mix(vec3(1.0), mix(twice, vec3(1.0), path.uncovered), dense);
-    return cover_closure(closure, path.spread, kept, path.ior_excess, view_cosine);
+    cover.kept = mix(vec3(1.0), mix(twice, vec3(1.0), path.uncovered), dense);
+    cover.bend = path.bend;
+    cover.ior_excess = path.ior_excess;
+    cover.view_cosine = view_cosine;
+    return cover_closure(closure, cover);
 }
 
 // The closure of a slab as it is seen through all that lies above it, by the view outside.
 Closure closure_below(Slab slab, Path path, vec3 view, float footprint) {
-    return closure_below_path(prepare_closure(slab, refracted_direction(view, path.ior_excess), footprint), path, view.z);
+    Closure closure = prepare_closure(slab, refracted_direction(view, path.ior_excess), footprint);
+    return closure_below_path(closure, slab, path, view.z);
 }
 
 // Light's way down to a slab, from the cosine outside: the layers' transmittance along the refracted direction, and 1
