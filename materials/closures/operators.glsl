@@ -252,7 +252,8 @@ Matter base_matter(Slab slab, float cos_view) {
         reflected = medium.reflected;
         through = medium.through + medium.straight;
         absorbed = medium.absorbed;
-        scattered = medium.through / max(through, vec3(1e-30));
+        // What lets nothing through scatters.
+        scattered = (medium.through + vec3(1e-30)) / (through + vec3(1e-30));
         vec3 between = vec3(1.0) / max(medium.kept + leaving * reflected, vec3(1e-30));
         albedo = min(reflected * leaving * between, vec3(1.0));
         passed = through * between;
@@ -260,7 +261,7 @@ Matter base_matter(Slab slab, float cos_view) {
         // Of light from all around on its way down, that which is thrown back counts as well.
         m.scattered = either(scattered, medium.reflected);
         m.transmittance =
-            exp(log(clamp(through / max(medium.kept, vec3(1e-30)), vec3(1e-30), vec3(1.0))) * mean_cosine);
+            exp(log(clamp((through + vec3(1e-30)) / (medium.kept + vec3(1e-30)), vec3(1e-30), vec3(1.0))) * mean_cosine);
     }
 #endif
     Fresnel fresnel = slab_fresnel(slab);
@@ -299,7 +300,7 @@ Matter slab_matter(Slab slab, Closure closure) {
 #ifdef NACRE_SLAB_MEDIUM
     if ((slab.features & slab_medium) != 0u) {
         // Up by the view's own share. Down it comes at the same angle: what goes straight falls with the way's length.
-        vec3 up = through / max(m.view_transmittance, vec3(1e-30));
+        vec3 up = (through + vec3(1e-30)) / (m.view_transmittance + vec3(1e-30));
         float way = mean_cosine / max(refracted_cosine(closure.view.z, closure.reflectance), 0.01);
         vec3 down = vec3(exponential_rest(minus_log_rest(m.scattered.x) * way),
                          exponential_rest(minus_log_rest(m.scattered.y) * way),
@@ -371,13 +372,16 @@ float alpha2_of_both(float alpha2_a, vec3 mirrored_a, float alpha2_b, vec3 mirro
     return (a * alpha2_a + b * alpha2_b) / max(a + b, 1e-30);
 }
 
-// Of two media, by how deep each is and how much it covers.
-float bend_of_both(float bend_a, vec3 transmittance_a, float share_a, float bend_b, vec3 transmittance_b,
-                   float share_b) {
-    float a = share_a * -log(clamp(dot(transmittance_a, vec3(1.0 / 3.0)), 1e-3, 1.0));
-    float b = share_b * -log(clamp(dot(transmittance_b, vec3(1.0 / 3.0)), 1e-3, 1.0));
-    // What hardly absorbs bends nothing that tells, and of what takes all but a thousandth no digits are left.
-    return (a * bend_a + b * bend_b) / (a + b + 1e-5);
+// How much it tells of a medium in which directions light crosses it.
+float medium_weight(vec3 transmittance, vec3 scattered) {
+    return -log(clamp(dot(transmittance, vec3(1.0 / 3.0)), 1e-3, 1.0)) + dot(scattered, vec3(1.0 / 3.0));
+}
+
+// Of two media, by that and by how much each covers.
+float bend_of_both(float bend_a, float weight_a, float bend_b, float weight_b) {
+    // What hardly absorbs or scatters bends nothing that tells, and of what takes all but a thousandth no digits are
+    // left.
+    return (weight_a * bend_a + weight_b * bend_b) / (weight_a + weight_b + 1e-5);
 }
 
 // Side by side: a on 1 - amount of the surface, b on the rest.
@@ -400,7 +404,8 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     m.gloss = gloss_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
     m.alpha2 = alpha2_of_both(a.alpha2, covered_a * a.albedo * a.gloss, b.alpha2, covered_b * b.albedo * b.gloss);
     m.ior = mix(a.ior, b.ior, share);
-    m.bend = bend_of_both(a.bend, a.transmittance, covered_a, b.bend, b.transmittance, covered_b);
+    m.bend = bend_of_both(a.bend, covered_a * medium_weight(a.transmittance, a.scattered), b.bend,
+                          covered_b * medium_weight(b.transmittance, b.scattered));
     m.scattered = mix(a.scattered, b.scattered, share);
     m.cos_view = a.cos_view;
     return m;
@@ -450,7 +455,8 @@ Matter layer_matter(Matter top, Matter base) {
     m.gloss = gloss_of_both(top, of_top, base, of_base);
     m.alpha2 = alpha2_of_both(top.alpha2, of_top * top.gloss,
                               base.alpha2 * square(mix(1.0, top.ior, tb / max(b + tb, 1e-30))), of_base * base.gloss);
-    m.bend = bend_of_both(top.bend, top.transmittance, t + tb, either(top.bend, base.bend), base.transmittance, b + tb);
+    m.bend = bend_of_both(top.bend, (t + tb) * medium_weight(top.transmittance, top.scattered),
+                          either(top.bend, base.bend), (b + tb) * medium_weight(base.transmittance, base.scattered));
     m.scattered = either(top.scattered * (t + tb), base.scattered * (b + tb));
     m.ior = mix(1.0, top.ior, t + tb) * mix(1.0, base.ior, b + tb);
     m.cos_view = top.cos_view;
@@ -468,19 +474,20 @@ Path path_through_mix(Path path, float amount) {
 // the material: light that is thrown back may hit any part of it.
 Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     vec3 beside = vec3(top.bare);
-    Bounces bounces = bounces_between(top, base);
-    // What was scattered above is diffuse light here.
-    vec3 kept_straight = vec3(1.0) - path.spread;
-    vec3 diffuse_share = path.spread / (vec3(1.0) + vec3(sqrt(max(kept_straight.x, 0.0)), sqrt(max(kept_straight.y, 0.0)),
-                                                         sqrt(max(kept_straight.z, 0.0))));
-    vec3 through =
-        top.coverage * mix(top.view_transmittance, top.passed, diffuse_share) * bounces.leaving;
+    // What was scattered above on its way up is diffuse light here: half of both ways.
+    vec3 straight = max(vec3(1.0) - path.spread, vec3(0.0));
+    vec3 scattered = path.spread / (vec3(1.0) + vec3(sqrt(straight.x), sqrt(straight.y), sqrt(straight.z)));
+    Matter seen = top;
+    seen.cos_view = mix(top.cos_view, mean_cosine, dot(scattered, vec3(1.0 / 3.0)));
+    Bounces bounces = bounces_between(seen, base);
+    vec3 through = top.coverage * mix(top.view_transmittance, top.passed, scattered) * bounces.leaving;
     vec3 sum = beside + through;
     // Where nothing comes through the rest does not matter.
     vec3 by = beside / max(sum, vec3(1e-30));
     Path above;
     above.weight = path.weight * sum;
-    above.spread = either(path.spread, top.scattered * through / max(sum, vec3(1e-30)));
+    vec3 spread_by_top = top.scattered * through / max(sum, vec3(1e-30));
+    above.spread = either(path.spread, spread_by_top);
     above.ior_excess = widening.ior_excess;
     above.uncovered = path.uncovered * by;
     // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
@@ -488,8 +495,9 @@ Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     vec3 kept_above = mix(path.transmittance, vec3(1.0), path.uncovered);
     vec3 kept_by_top = mix(top.transmittance, vec3(1.0), by);
     vec3 kept = kept_above * kept_by_top;
-    above.bend =
-        bend_of_both(path.bend, kept_above, 1.0, either(refraction_bend(path.ior_excess), top.bend), kept_by_top, 1.0);
+    above.bend = bend_of_both(path.bend, medium_weight(kept_above, path.spread),
+                              either(refraction_bend(path.ior_excess), top.bend),
+                              medium_weight(kept_by_top, spread_by_top));
     vec3 covered = max(vec3(1.0) - above.uncovered, vec3(1e-30));
     above.transmittance = min(max(kept - above.uncovered, vec3(0.0)) / covered, vec3(1.0));
     return above;
