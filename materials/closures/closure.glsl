@@ -714,6 +714,17 @@ struct Cover {
     float view_cosine;  // outside
 };
 
+// Of what light for a lobe is scattered on its way down and up, about this part of the depth is that of the way up: what
+// is thrown back counts down alone.
+const float upward_share = 0.35;
+
+// The share that is scattered on its way up by that on both.
+vec3 scattered_up(vec3 spread) {
+    return vec3(exponential_rest(upward_share * minus_log_rest(spread.x)),
+                exponential_rest(upward_share * minus_log_rest(spread.y)),
+                exponential_rest(upward_share * minus_log_rest(spread.z)));
+}
+
 // What a scattering medium leaves of a lobe's light on its straight way down.
 float veil_transmittance(Closure closure, float cosine) {
     return exp(-closure.veil *
@@ -722,8 +733,10 @@ float veil_transmittance(Closure closure, float cosine) {
 
 // The same for all of a lobe. Lobes are wide outside, and none of their light comes from below.
 float lobe_veil(Closure closure, SpecularLobe lobe, float view_cosine) {
-    float width = lobe.is_mirror ? 0.0 : min(2.7 * sqrt(lobe.area) * (1.0 + closure.ior_excess), 1.0);
-    return veil_transmittance(closure, sqrt(mix(view_cosine * view_cosine, 0.45, width)));
+    float width = lobe.is_mirror ? 0.0 : min(2.7 * sqrt(lobe.area) * (1.0 + closure.ior_excess), 0.55);
+    float cosine2 = view_cosine * view_cosine;
+    return veil_transmittance(closure,
+                              sqrt(mix(cosine2, 0.45 - 1.1 * cosine2 * square(1.0 - cosine2), width)));
 }
 
 // A closure that is seen through layers, prepared for the view inside. What is scattered on its way does not come along
@@ -731,13 +744,11 @@ float lobe_veil(Closure closure, SpecularLobe lobe, float view_cosine) {
 Closure cover_closure(Closure closure, Cover cover) {
     Closure covered = closure;
     float ior_excess = cover.ior_excess;
-    // Down and up are alike for light that is mirrored.
-    vec3 straight = vec3(sqrt(1.0 - min(cover.spread.x, 1.0)), sqrt(1.0 - min(cover.spread.y, 1.0)),
-                         sqrt(1.0 - min(cover.spread.z, 1.0)));
-    vec3 up = cover.spread / (vec3(1.0) + straight);
+    vec3 up = scattered_up(cover.spread);
+    vec3 straight = vec3(1.0) - up;
     float bend = cover.bend;
     float slant = sqrt(bend + cover.view_cosine * cover.view_cosine * (1.0 - bend));
-    covered.veil = 0.5 * minus_log_rest(dot(cover.spread, vec3(1.0 / 3.0))) * max(slant, 0.01);
+    covered.veil = (1.0 - upward_share) * minus_log_rest(dot(cover.spread, vec3(1.0 / 3.0))) * max(slant, 0.01);
     covered.veil_bend = bend;
     vec3 specular = closure.specular.albedo;
     covered.specular = scaled_lobe(closure.specular, straight);

@@ -474,9 +474,8 @@ Path path_through_mix(Path path, float amount) {
 // the material: light that is thrown back may hit any part of it.
 Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     vec3 beside = vec3(top.bare);
-    // What was scattered above on its way up is diffuse light here: half of both ways.
-    vec3 straight = max(vec3(1.0) - path.spread, vec3(0.0));
-    vec3 scattered = path.spread / (vec3(1.0) + vec3(sqrt(straight.x), sqrt(straight.y), sqrt(straight.z)));
+    // What was scattered above on its way up is diffuse light here.
+    vec3 scattered = scattered_up(path.spread);
     Matter seen = top;
     seen.cos_view = mix(top.cos_view, mean_cosine, dot(scattered, vec3(1.0 / 3.0)));
     Bounces bounces = bounces_between(seen, base);
