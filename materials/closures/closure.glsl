@@ -718,11 +718,14 @@ struct Cover {
 // is thrown back counts down alone.
 const float upward_share = 0.35;
 
+// Optical depth of both ways by the share that is scattered. Of what is nearly all, 32 bits do not know the rest.
+float spread_depth(float spread) { return minus_log_rest(min(spread, 0.9998)); }
+
 // The share that is scattered on its way up by that on both.
 vec3 scattered_up(vec3 spread) {
-    return vec3(exponential_rest(upward_share * minus_log_rest(spread.x)),
-                exponential_rest(upward_share * minus_log_rest(spread.y)),
-                exponential_rest(upward_share * minus_log_rest(spread.z)));
+    return vec3(exponential_rest(upward_share * spread_depth(spread.x)),
+                exponential_rest(upward_share * spread_depth(spread.y)),
+                exponential_rest(upward_share * spread_depth(spread.z)));
 }
 
 // What a scattering medium leaves of a lobe's light on its straight way down.
@@ -748,7 +751,7 @@ Closure cover_closure(Closure closure, Cover cover) {
     vec3 straight = vec3(1.0) - up;
     float bend = cover.bend;
     float slant = sqrt(bend + cover.view_cosine * cover.view_cosine * (1.0 - bend));
-    covered.veil = (1.0 - upward_share) * minus_log_rest(dot(cover.spread, vec3(1.0 / 3.0))) * max(slant, 0.01);
+    covered.veil = (1.0 - upward_share) * spread_depth(dot(cover.spread, vec3(1.0 / 3.0))) * max(slant, 0.01);
     covered.veil_bend = bend;
     vec3 specular = closure.specular.albedo;
     covered.specular = scaled_lobe(closure.specular, straight);
