@@ -21,9 +21,9 @@ using image_formats::check_limits;
 constexpr std::string_view attempt_read = "read picture";
 constexpr std::string_view attempt_write = "write picture";
 
-std::string quoted(const std::filesystem::path& file) { return fmt::format("'{}'", file.string()); }
+std::string subject_of(const std::filesystem::path& file) { return fmt::format("'{}'", file.string()); }
 
-std::string quoted(std::string_view name) { return fmt::format("'{}'", name); }
+std::string subject_of(std::string_view name) { return fmt::format("'{}'", name); }
 
 bool starts_with(std::span<const std::byte> data, std::string_view magic) {
     return data.size() >= magic.size() && std::memcmp(data.data(), magic.data(), magic.size()) == 0;
@@ -244,50 +244,50 @@ std::string_view name_of(ImageFormat format) {
 }
 
 Expected<ImageInfo> read_image_info(const std::filesystem::path& file, const ImageLimits& limits) {
-    return guard_memory(quoted(file), [&]() -> Expected<ImageInfo> {
+    return guard_memory(subject_of(file), [&]() -> Expected<ImageInfo> {
         NACRE_TRY(const auto data, read_binary_file(file, limits.max_file_bytes));
-        return info_of(data, quoted(file), limits);
+        return info_of(data, subject_of(file), limits);
     });
 }
 
 Expected<ImageInfo> read_image_info(std::span<const std::byte> data, std::string_view name, const ImageLimits& limits) {
-    return info_of(data, quoted(name), limits);
+    return info_of(data, subject_of(name), limits);
 }
 
 Expected<ImageBytes> read_image_bytes(const std::filesystem::path& file, const ImageBytesOptions& options,
                                       const ImageLimits& limits) {
-    return guard_memory(quoted(file), [&]() -> Expected<ImageBytes> {
+    return guard_memory(subject_of(file), [&]() -> Expected<ImageBytes> {
         NACRE_TRY(const auto data, read_binary_file(file, limits.max_file_bytes));
-        return bytes_of(data, quoted(file), options, limits);
+        return bytes_of(data, subject_of(file), options, limits);
     });
 }
 
 Expected<ImageBytes> read_image_bytes(std::span<const std::byte> data, std::string_view name,
                                       const ImageBytesOptions& options, const ImageLimits& limits) {
-    return bytes_of(data, quoted(name), options, limits);
+    return bytes_of(data, subject_of(name), options, limits);
 }
 
 Expected<Image> read_image(const std::filesystem::path& file, const ImageLimits& limits) {
-    return guard_memory(quoted(file), [&]() -> Expected<Image> {
+    return guard_memory(subject_of(file), [&]() -> Expected<Image> {
         NACRE_TRY(const auto data, read_binary_file(file, limits.max_file_bytes));
-        return linear_of(data, quoted(file), limits);
+        return linear_of(data, subject_of(file), limits);
     });
 }
 
 Expected<Image> read_image(std::span<const std::byte> data, std::string_view name, const ImageLimits& limits) {
-    return linear_of(data, quoted(name), limits);
+    return linear_of(data, subject_of(name), limits);
 }
 
 Expected<LayeredImage> read_exr_layers(const std::filesystem::path& file, const ImageLimits& limits) {
-    return guard_memory(quoted(file), [&]() -> Expected<LayeredImage> {
+    return guard_memory(subject_of(file), [&]() -> Expected<LayeredImage> {
         NACRE_TRY(const auto data, read_binary_file(file, limits.max_file_bytes));
-        return layers_of(data, quoted(file), limits);
+        return layers_of(data, subject_of(file), limits);
     });
 }
 
 Expected<LayeredImage> read_exr_layers(std::span<const std::byte> data, std::string_view name,
                                        const ImageLimits& limits) {
-    return layers_of(data, quoted(name), limits);
+    return layers_of(data, subject_of(name), limits);
 }
 
 ImageLayer make_layer(std::string name, const Image& image) {
@@ -335,7 +335,7 @@ Image linear_from_srgb_bytes(const ImageBytes& image) {
 Expected<void> write_png(const std::filesystem::path& file, const ImageBytes& image) {
     Expected<std::vector<std::byte>> data = encode_png(image);
     if (!data) {
-        data.error().subject = quoted(file);
+        data.error().subject = subject_of(file);
         return std::unexpected(data.error());
     }
     return write_file_atomically(file, *data);
@@ -346,9 +346,9 @@ Expected<void> write_png(const std::filesystem::path& file, const Image& image) 
 }
 
 Expected<void> write_exr(const std::filesystem::path& file, const LayeredImage& image) {
-    NACRE_CHECK(check_layers(image, quoted(file)));
-    return guard_memory(quoted(file), [&]() -> Expected<void> {
-        NACRE_TRY(const auto data, image_formats::encode_exr(image, quoted(file)));
+    NACRE_CHECK(check_layers(image, subject_of(file)));
+    return guard_memory(subject_of(file), [&]() -> Expected<void> {
+        NACRE_TRY(const auto data, image_formats::encode_exr(image, subject_of(file)));
         return write_file_atomically(file, data);
     });
 }

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "materials/conversions.h"
+#include "materials/limited.h"
 
 namespace nacre::materials {
 namespace {
@@ -17,8 +18,6 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 // What coats are thick: only the ratio to their mean free path counts.
 constexpr float coat_thickness = 1e-4f;
 
-float limited(float value, float low, float high) { return std::isnan(value) ? low : std::clamp(value, low, high); }
-float unit(float value) { return limited(value, 0.0f, 1.0f); }
 float largest(const glm::vec3& v) { return std::max({v.x, v.y, v.z}); }
 
 /// A slab that is being put together, with its textures.
@@ -236,7 +235,6 @@ glm::vec3 tint_of(const glm::vec3& color) { return largest(color) > 0.0f ? color
 
 glm::vec3 between(const glm::vec3& a, const glm::vec3& b, float t) { return a + (b - a) * unit(t); }
 
-glm::vec3 unit(const glm::vec3& color) { return {unit(color.x), unit(color.y), unit(color.z)}; }
 
 }  // namespace
 

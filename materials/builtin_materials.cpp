@@ -179,7 +179,7 @@ Tree block_of(const Block& block) {
     return tree;
 }
 
-Tree coated_layer() {
+Tree coated_metal() {
     Tree tree;
     const NodeIndex base = add(tree, DefaultLit{.base_color = aluminum, .metallic = 1.0f, .roughness = 0.35f, .anisotropy = 0.8f});
     add(tree, CoatedLayer{.coat_color = {0.9f, 0.25f, 0.08f}, .coat_roughness = 0.08f}, base);
@@ -213,7 +213,7 @@ const Entry entries[] = {
      [] { return block_of(DefaultLit{.base_color = {{0.8f, 0.35f, 0.12f}}, .metallic = 0.5f, .roughness = 0.35f}); }},
     {{"unlit", "block: light of its own"},
      [] { return block_of(Unlit{.emission = {{0.9f, 0.5f, 0.1f}}}); }},
-    {{"coated-layer", "block: brushed metal under a colored layer"}, coated_layer},
+    {{"coated-layer", "block: brushed metal under a colored layer"}, coated_metal},
     {{"clear-coat", "block: metallic paint under a clear coat"},
      [] {
          return block_of(ClearCoat{

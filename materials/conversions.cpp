@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "materials/closures/library.h"
+#include "materials/limited.h"
 
 namespace nacre::materials {
 namespace {
@@ -14,10 +15,6 @@ using closures::Library;
 
 closures::Lobes lobes;  // stateless
 
-float limited(float value, float low, float high) { return std::isnan(value) ? low : std::clamp(value, low, high); }
-glm::vec3 unit(const glm::vec3& v) {
-    return {limited(v.x, 0.0f, 1.0f), limited(v.y, 0.0f, 1.0f), limited(v.z, 0.0f, 1.0f)};
-}
 
 }  // namespace
 

@@ -7,12 +7,11 @@
 
 #include "materials/building_blocks.h"
 #include "materials/conversions.h"
+#include "materials/limited.h"
 
 namespace nacre::materials {
 namespace {
 
-float unit(float value) { return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : 0.0f; }
-glm::vec3 unit(const glm::vec3& value) { return {unit(value.x), unit(value.y), unit(value.z)}; }
 
 class Builder {
   public:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "materials/evaluation.h"
+#include "materials/turned.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,13 +20,6 @@ Library::Slab read_slab(const FlattenedTree& tree, std::uint32_t leaf) {
     Library::Slab slab = Library::slab_of(tree.visible_tree.nodes[tree.topology.slabs[leaf]].slab);
     if (tree.topology.thickness[leaf] >= 0.0f) slab.thickness = tree.topology.thickness[leaf];
     return slab;
-}
-
-// A direction of the surface's frame in one that is turned around the normal.
-glm::dvec3 turned(const glm::dvec3& direction, double angle) {
-    if (angle == 0.0) return direction;
-    const double c = std::cos(angle), s = std::sin(angle);
-    return {c * direction.x + s * direction.y, c * direction.y - s * direction.x, direction.z};
 }
 
 bool is_white(const glm::dvec3& color) { return glm::all(glm::greaterThan(color, glm::dvec3(1.0 - 1e-9))); }

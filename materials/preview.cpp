@@ -11,6 +11,7 @@
 
 #include "materials/evaluation.h"
 #include "materials/specular_table.h"
+#include "materials/turned.h"
 
 namespace nacre::materials {
 namespace {
@@ -38,11 +39,6 @@ Frame frame_at(const glm::dvec3& normal) {
     const double length = glm::length(across);
     const glm::dvec3 tangent = length > 1e-6 ? across / length : glm::dvec3(1, 0, 0);
     return {tangent, glm::cross(normal, tangent), normal};
-}
-
-glm::dvec3 turned(const glm::dvec3& v, double angle) {
-    const double c = std::cos(angle), s = std::sin(angle);
-    return {c * v.x - s * v.y, s * v.x + c * v.y, v.z};
 }
 
 // A number in [0, 1) for each pixel and dimension.
@@ -103,7 +99,7 @@ glm::dvec3 radiance_of(const ShadedClosure& c, const Frame& frame, std::uint32_t
                                 stratified((i % strata + 0.5) / strata, 1), stratified((i / strata + 0.5) / strata, 2));
         const Library::ClosureSample sample = library.sample_closure(c.closure, random);
         if (sample.pdf <= 0.0 || sample.direction.z <= 0.0) continue;
-        const glm::dvec3 direction = frame.to_world(turned(sample.direction, c.rotation));
+        const glm::dvec3 direction = frame.to_world(turned(sample.direction, -c.rotation));
         const double own = count * sample.pdf;
         const double share = sample.is_mirror ? 1.0 : own / (own + box_count * soft_box.density(direction));
         sum += sample.weight * library.top_transmittance(c.path, sample.direction.z) *
@@ -112,7 +108,7 @@ glm::dvec3 radiance_of(const ShadedClosure& c, const Frame& frame, std::uint32_t
     for (int i = 0; i < box_strata * box_strata; ++i) {
         const glm::dvec3 direction = soft_box.direction((i % box_strata + number_of(x, y, 3 + i)) / box_strata,
                                                         (i / box_strata + number_of(x, y, 40 + i)) / box_strata);
-        const glm::dvec3 light = turned(frame.to_local(direction), -c.rotation);
+        const glm::dvec3 light = turned(frame.to_local(direction), c.rotation);
         if (light.z <= 0.0) continue;
         const Library::ClosureValue value = library.evaluate_closure(c.closure, light);
         sum += (value.specular + value.diffuse + value.subsurface) * library.top_transmittance(c.path, light.z) *

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "materials/closures/library.h"
+#include "materials/turned.h"
 
 namespace nacre::materials {
 namespace {
@@ -29,13 +30,6 @@ double uniform(Generator& random) { return static_cast<double>(random() >> 11) *
 
 double mean(const glm::dvec3& v) { return (v.x + v.y + v.z) / 3.0; }
 double largest(const glm::dvec3& v) { return std::max({v.x, v.y, v.z}); }
-
-// A direction of the surface's frame in one that is turned around the normal.
-glm::dvec3 turned(const glm::dvec3& v, double angle) {
-    if (angle == 0.0) return v;
-    const double c = std::cos(angle), s = std::sin(angle);
-    return {c * v.x + s * v.y, c * v.y - s * v.x, v.z};
-}
 
 // A unit vector at `cosine` from `axis`, `phi` around it.
 glm::dvec3 around(const glm::dvec3& axis, double cosine, double phi) {

@@ -245,8 +245,6 @@ class Layout {
     std::uint32_t frame_ = 0;
 };
 
-double octaves(const StorageFormat& format) { return std::log2(format.high / format.low); }
-
 /// A field of a slab as up to three numbers; nothing for what is not the slab's.
 glm::dvec3* color_of(Library::Slab& slab, StorageValue value) {
     switch (value) {
@@ -292,9 +290,9 @@ std::uint32_t encode_number(const StorageFormat& format, std::uint32_t bits, dou
     switch (format.codec) {
         case StorageCodec::unit: return library.pack_unit((value - format.low) / (format.high - format.low), bits, dither);
         case StorageCodec::signed_unit: return library.pack_signed(value, bits, dither);
-        case StorageCodec::logarithm: return library.pack_logarithm(value, bits, format.low, octaves(format), dither);
+        case StorageCodec::logarithm: return library.pack_logarithm(value, bits, format.low, format.octaves(), dither);
         case StorageCodec::signed_logarithm:
-            return library.pack_signed_logarithm(value, bits, format.low, octaves(format), dither);
+            return library.pack_signed_logarithm(value, bits, format.low, format.octaves(), dither);
         case StorageCodec::fraction: return library.pack_fraction(value, bits);
         case StorageCodec::angle:
             return static_cast<std::uint32_t>(value / std::numbers::pi * (1u << bits) + 0.5) & ((1u << bits) - 1u);
@@ -306,9 +304,9 @@ double decode_number(const StorageFormat& format, std::uint32_t bits, std::uint3
     switch (format.codec) {
         case StorageCodec::unit: return format.low + (format.high - format.low) * library.unpack_unit(code, bits);
         case StorageCodec::signed_unit: return library.unpack_signed(code, bits);
-        case StorageCodec::logarithm: return library.unpack_logarithm(code, bits, format.low, octaves(format));
+        case StorageCodec::logarithm: return library.unpack_logarithm(code, bits, format.low, format.octaves());
         case StorageCodec::signed_logarithm:
-            return library.unpack_signed_logarithm(code, bits, format.low, octaves(format));
+            return library.unpack_signed_logarithm(code, bits, format.low, format.octaves());
         case StorageCodec::fraction: return library.unpack_fraction(code, bits);
         case StorageCodec::angle: return code * std::numbers::pi / (1u << bits);
         default: return code;

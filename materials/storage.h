@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -73,6 +74,8 @@ struct StorageFormat {
     std::uint32_t bits;
     StorageCodec codec;
     double low = 0.0, high = 1.0;  ///< Of `unit` and `logarithm`: range of the values.
+
+    [[nodiscard]] double octaves() const { return std::log2(high / low); }
 };
 
 /// Of any value.

@@ -16,8 +16,6 @@ std::string number(double value) {
     return text;
 }
 
-double octaves(const StorageFormat& format) { return std::log2(format.high / format.low); }
-
 // The member of Slab that a field holds; empty for what is none.
 const char* member_of(StorageValue value) {
     switch (value) {
@@ -57,10 +55,10 @@ std::string encode(const StorageFormat& format, std::uint32_t bits, const std::s
         case StorageCodec::signed_unit: return fmt::format("pack_signed({}, {}u, {})", value, bits, dither);
         case StorageCodec::logarithm:
             return fmt::format("pack_logarithm({}, {}u, {}, {}, {})", value, bits, number(format.low),
-                               number(octaves(format)), dither);
+                               number(format.octaves()), dither);
         case StorageCodec::signed_logarithm:
             return fmt::format("pack_signed_logarithm({}, {}u, {}, {}, {})", value, bits, number(format.low),
-                               number(octaves(format)), dither);
+                               number(format.octaves()), dither);
         case StorageCodec::fraction: return fmt::format("pack_fraction({}, {}u)", value, bits);
         case StorageCodec::color:
         case StorageCodec::direction:
@@ -78,10 +76,10 @@ std::string decode(const StorageFormat& format, std::uint32_t bits, const std::s
                                bits);
         case StorageCodec::signed_unit: return fmt::format("unpack_signed({}, {}u)", code, bits);
         case StorageCodec::logarithm:
-            return fmt::format("unpack_logarithm({}, {}u, {}, {})", code, bits, number(format.low), number(octaves(format)));
+            return fmt::format("unpack_logarithm({}, {}u, {}, {})", code, bits, number(format.low), number(format.octaves()));
         case StorageCodec::signed_logarithm:
             return fmt::format("unpack_signed_logarithm({}, {}u, {}, {})", code, bits, number(format.low),
-                               number(octaves(format)));
+                               number(format.octaves()));
         case StorageCodec::fraction: return fmt::format("unpack_fraction({}, {}u)", code, bits);
         case StorageCodec::color: return fmt::format("unpack_color({})", code);
         case StorageCodec::direction:

@@ -21,7 +21,6 @@ namespace {
 using json = nlohmann::ordered_json;
 
 constexpr std::uint64_t largest_file = std::uint64_t{16} << 20;
-constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr std::string_view channel_names = "rgba";
 constexpr std::size_t specular_lut_count = 256;  // stored in 8 bits
 
@@ -112,7 +111,7 @@ class Reader {
 
     Expected<void> number(const json& value, std::string_view place, float& result) const {
         if (value.is_string() && value.get<std::string>() == "infinity") {
-            result = infinity;
+            result = std::numeric_limits<float>::infinity();
             return {};
         }
         if (!value.is_number()) {

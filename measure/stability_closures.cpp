@@ -16,8 +16,6 @@ namespace {
 
 using namespace materials;
 
-constexpr float infinity = std::numeric_limits<float>::infinity();
-
 /// What the shader reads for one point, in this order; only 32-bit words.
 struct ClosurePoint {
     Slab slab;
@@ -299,9 +297,9 @@ std::vector<StabilitySubject> closure_subjects() {
             set_depth(random, slab, regime.low, regime.high);
             const bool is_opaque = regime.high > 10.0, is_empty = regime.low < -10.0;
             if (is_opaque && random() < 0.1) slab.mean_free_path = glm::vec3(random() < 0.5 ? 0.0f : 1e-40f);
-            if (is_empty && random() < 0.1) slab.mean_free_path = glm::vec3(infinity);
+            if (is_empty && random() < 0.1) slab.mean_free_path = glm::vec3(std::numeric_limits<float>::infinity());
             if (is_empty && random() < 0.1) slab.thickness = random() < 0.5 ? 0.0f : 1e-40f;
-            if (regime.low > 0.0 && regime.low < 1.0 && random() < 0.3) slab.thickness = infinity;
+            if (regime.low > 0.0 && regime.low < 1.0 && random() < 0.3) slab.thickness = std::numeric_limits<float>::infinity();
         }));
         for (const double depth : {regime.low, 0.5 * (regime.low + regime.high), regime.high}) {
             for (const float phase : {0.0f, 0.8f, -0.8f}) {

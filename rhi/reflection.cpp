@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#define SPV_ENABLE_UTILITY_CODE  // For HasResultAndType.
 #include <spirv/unified1/spirv.hpp11>
 
 #include "rhi/binding_type.h"

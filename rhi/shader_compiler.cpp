@@ -24,7 +24,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view action = "compile shader";
 constexpr std::string_view cache_category = "spirv";
 constexpr std::uint64_t max_file_bytes = 16u << 20;
 
@@ -194,16 +193,16 @@ struct ShaderCompiler::State {
         const auto subject = fmt::format("'{}'", source.path);
         const auto stage = stage_of(source.path);
         if (!stage)
-            return fail(ErrorCode::invalid_argument, std::string(action), subject,
+            return fail(ErrorCode::invalid_argument, std::string(compile_action), subject,
                         "the end of the path does not tell the stage", "Let it end in .vert, .frag or .comp.");
         const auto path = normalized(source.path);
         if (!path)
-            return fail(ErrorCode::invalid_argument, std::string(action), subject,
+            return fail(ErrorCode::invalid_argument, std::string(compile_action), subject,
                         "the path leads out of the root of the sources",
                         "Use a path below it, as in \"passes/lighting/lighting.comp\".");
         for (const ShaderDefine& define : source.defines) {
             if (!is_identifier(define.name) || define.value.find_first_of("\n\\") != std::string::npos)
-                return fail(ErrorCode::invalid_argument, std::string(action), subject,
+                return fail(ErrorCode::invalid_argument, std::string(compile_action), subject,
                             fmt::format("cannot define '{}' as '{}'", define.name, define.value),
                             "Names are identifiers; values are one line without a backslash.");
         }
@@ -286,7 +285,7 @@ Expected<ShaderDesc> ShaderCompiler::compile(const ShaderSource& source) {
         state_->sources[identity_of(source)] = {collection.order, collection.looked_at};
     }
     if (collection.order.empty())
-        return fail(ErrorCode::not_found, std::string(action), fmt::format("'{}'", source.path),
+        return fail(ErrorCode::not_found, std::string(compile_action), fmt::format("'{}'", source.path),
                     state_->desc.source_folder.empty()
                         ? std::string("there is no embedded file of that path")
                         : fmt::format("there is no such file below '{}', and none is embedded",

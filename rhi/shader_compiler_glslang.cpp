@@ -14,7 +14,6 @@
 namespace nacre::rhi {
 namespace {
 
-constexpr std::string_view action = "compile shader";
 // Deep enough for any real tree; a file that includes itself without a guard ends here.
 constexpr std::size_t max_include_depth = 48;
 
@@ -115,16 +114,16 @@ std::unexpected<Error> rejected(const GlslInput& input, const Includer& includer
         if (file != input.files.end() && file->second.include_lines.contains(missing.name))
             line = file->second.include_lines.at(missing.name);
         if (missing.is_too_deep)
-            return fail(ErrorCode::shader_compile, std::string(action), fmt::format("'{}'", input.path),
+            return fail(ErrorCode::shader_compile, std::string(compile_action), fmt::format("'{}'", input.path),
                         fmt::format("{}:{}: includes are nested more than {} deep; '{}' includes itself",
                                     missing.includer, line, max_include_depth, missing.name),
                         "Write #pragma once at its top.");
-        return fail(ErrorCode::not_found, std::string(action), fmt::format("'{}'", input.path),
+        return fail(ErrorCode::not_found, std::string(compile_action), fmt::format("'{}'", input.path),
                     fmt::format("{}:{}: there is no file '{}', neither beside '{}' nor from the root", missing.includer,
                                 line, missing.name, missing.includer),
                     "Correct the path, or add the file to the embedded files of its part.");
     }
-    return fail(ErrorCode::shader_compile, std::string(action), fmt::format("'{}'", input.path),
+    return fail(ErrorCode::shader_compile, std::string(compile_action), fmt::format("'{}'", input.path),
                 fmt::format("the compiler says:\n{}", log));
 }
 
@@ -190,7 +189,7 @@ Expected<std::vector<std::uint32_t>> compile_for(const GlslInput& input, glslang
     std::vector<std::uint32_t> words;
     glslang::GlslangToSpv(*program.getIntermediate(language), words, &logger, &options);
     if (words.empty())
-        return fail(ErrorCode::shader_compile, std::string(action), fmt::format("'{}'", input.path),
+        return fail(ErrorCode::shader_compile, std::string(compile_action), fmt::format("'{}'", input.path),
                     fmt::format("no SPIR-V came out: {}", logger.getAllMessages()));
     return input.optimize ? optimize(std::move(words), input.path) : std::move(words);
 }

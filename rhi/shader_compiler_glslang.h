@@ -14,6 +14,9 @@
 
 namespace nacre::rhi {
 
+/// What errors say was attempted.
+inline constexpr std::string_view compile_action = "compile shader";
+
 /// A file as the compiler sees it.
 struct GlslFile {
     std::string text;

@@ -8,14 +8,6 @@
 #include "rhi/submission_walk.h"
 
 namespace nacre::rhi {
-namespace {
-
-SubresourceRange range_of(const ViewReference& view) {
-    return {view.base_mip, view.mip_count, view.base_layer, view.layer_count};
-}
-
-}  // namespace
-
 SubmissionWalk::Step SubmissionWalk::copy_scope(CommandHeader& header) {
     tracker_.end_scope(&header);
     note_statement();

@@ -11,10 +11,6 @@ namespace {
 
 ResourceState for_stages(ResourceState state, ShaderStage stages) { return {state.use, state.stages & stages}; }
 
-SubresourceRange range_of(const ViewReference& view) {
-    return {view.base_mip, view.mip_count, view.base_layer, view.layer_count};
-}
-
 }  // namespace
 
 void SubmissionWalk::unset_state() {

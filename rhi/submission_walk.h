@@ -12,6 +12,11 @@
 
 namespace nacre::rhi {
 
+/// The part of a texture that a recorded view shows.
+[[nodiscard]] inline SubresourceRange range_of(const ViewReference& view) {
+    return {view.base_mip, view.mip_count, view.base_layer, view.layer_count};
+}
+
 /// Walks the lists of one submission: replaces handles by the backend's objects and tells the tracker what commands
 /// use.
 ///

@@ -4,13 +4,13 @@
 namespace nacre::materials {
 namespace {
 
-constexpr std::uint16_t table[] = {
+constexpr std::uint16_t anisotropy_words[] = {
 #include "materials/tables/anisotropy_table_data.inc"
 };
-static_assert(sizeof(table) == 2 * 2 * 20 * 18 * 15 * 3);
+static_assert(sizeof(anisotropy_words) == 2 * 2 * 20 * 18 * 15 * 3);
 
 }  // namespace
 
-std::span<const std::uint16_t> anisotropy_table() { return table; }
+std::span<const std::uint16_t> anisotropy_table() { return anisotropy_words; }
 
 }  // namespace nacre::materials

@@ -4,13 +4,13 @@
 namespace nacre::materials {
 namespace {
 
-constexpr std::uint16_t table[] = {
+constexpr std::uint16_t medium_words[] = {
 #include "materials/tables/medium_table_data.inc"
 };
-static_assert(sizeof(table) == 2 * 2 * medium_table_columns * medium_table_rows * medium_table_slices);
+static_assert(sizeof(medium_words) == 2 * 2 * medium_table_columns * medium_table_rows * medium_table_slices);
 
 }  // namespace
 
-std::span<const std::uint16_t> medium_table() { return table; }
+std::span<const std::uint16_t> medium_table() { return medium_words; }
 
 }  // namespace nacre::materials

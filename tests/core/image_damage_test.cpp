@@ -19,7 +19,7 @@ namespace {
 
 using testing::HasSubstr;
 
-std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+std::span<const std::byte> file_bytes(const std::string& text) { return std::as_bytes(std::span(text)); }
 
 std::string text_of(std::span<const std::byte> data) {
     return {reinterpret_cast<const char*>(data.data()), data.size()};
@@ -82,7 +82,7 @@ std::size_t peak_memory_bytes() {
 
 TEST(ImageDamageTest, SamplesAreSound) {
     for (const auto& [name, text] : samples()) {
-        const auto image = read_image(bytes_of(text), name);
+        const auto image = read_image(file_bytes(text), name);
         EXPECT_TRUE(image) << image.error().message();
     }
 }
@@ -90,7 +90,7 @@ TEST(ImageDamageTest, SamplesAreSound) {
 TEST(ImageDamageTest, EveryTruncationIsAnErrorThatNamesTheFile) {
     for (const auto& [name, text] : samples()) {
         for (std::size_t length = 0; length < text.size(); length += length < 200 ? 1 : 37) {
-            const auto image = read_image(bytes_of(text.substr(0, length)), "cut.file");
+            const auto image = read_image(file_bytes(text.substr(0, length)), "cut.file");
             ASSERT_FALSE(image) << name << " cut to " << length << " of " << text.size() << " bytes was read";
             EXPECT_THAT(image.error().message(), HasSubstr("'cut.file'"));
             EXPECT_EQ(image.error().code, ErrorCode::parse) << image.error().message();
@@ -105,7 +105,7 @@ TEST(ImageDamageTest, RandomDamageNeverCrashes) {
             std::string damaged = text;
             const unsigned count = 1 + random() % 4;
             for (unsigned i = 0; i < count; ++i) damaged[random() % damaged.size()] = static_cast<char>(random());
-            const auto image = read_image(bytes_of(damaged), "damaged", {.max_pixels = 1 << 22});
+            const auto image = read_image(file_bytes(damaged), "damaged", {.max_pixels = 1 << 22});
             if (image) EXPECT_EQ(image->pixels.size(), image->texel_count() * image->channels);
             else EXPECT_FALSE(image.error().message().empty());
         }
@@ -127,7 +127,7 @@ TEST(ImageDamageTest, HugeClaimsAreRefusedBeforeMemoryIsTaken) {
         for (int bit = 0; bit < 8; ++bit) crc = crc & 1 ? crc >> 1 ^ 0xedb88320 : crc >> 1;
     }
     set_big_endian(png, 29, ~crc, 4);
-    const auto cannot_hold = read_image_bytes(bytes_of(png), "boast.png");
+    const auto cannot_hold = read_image_bytes(file_bytes(png), "boast.png");
     ASSERT_FALSE(cannot_hold);
     EXPECT_THAT(cannot_hold.error().message(), HasSubstr("cannot hold 16384 x 16384"));
 
@@ -139,11 +139,11 @@ TEST(ImageDamageTest, HugeClaimsAreRefusedBeforeMemoryIsTaken) {
     std::memset(exr.data() + window + 8, 0x7e, 8);
     for (const auto& [name, text] : std::vector<std::pair<std::string, std::string>>{
              {"boast.jpg", jpeg}, {"boast.hdr", radiance}, {"boast.exr", exr}}) {
-        const auto info = read_image_info(bytes_of(text), name);
+        const auto info = read_image_info(file_bytes(text), name);
         ASSERT_FALSE(info) << name;
         EXPECT_EQ(info.error().code, ErrorCode::out_of_memory) << info.error().message();
         EXPECT_THAT(info.error().message(), HasSubstr(name));
-        EXPECT_FALSE(read_image(bytes_of(text), name));
+        EXPECT_FALSE(read_image(file_bytes(text), name));
     }
     EXPECT_LT(peak_memory_bytes() - before, std::size_t{100} << 20);
 }
@@ -154,7 +154,7 @@ TEST(ImageDamageTest, AnExrHeaderThatSaysTwoThingsIsRefused) {
         std::string exr = sample_exr();
         const std::size_t begin = exr.find(name);
         exr.insert(begin, exr.substr(begin, bytes));
-        const auto image = read_image(bytes_of(exr), "twice.exr");
+        const auto image = read_image(file_bytes(exr), "twice.exr");
         ASSERT_FALSE(image);
         EXPECT_THAT(image.error().message(), HasSubstr("'" + name + "' occurs twice"));
     }
@@ -164,7 +164,7 @@ TEST(ImageDamageTest, LimitsOfTheCallerHold) {
     const std::string png = sample_png();
     for (const ImageLimits& limits :
          {ImageLimits{.max_width = 63}, ImageLimits{.max_height = 47}, ImageLimits{.max_pixels = 64 * 48 - 1}}) {
-        const auto image = read_image_bytes(bytes_of(png), "large.png", {}, limits);
+        const auto image = read_image_bytes(file_bytes(png), "large.png", {}, limits);
         ASSERT_FALSE(image);
         EXPECT_EQ(image.error().code, ErrorCode::out_of_memory);
         EXPECT_THAT(image.error().message(), HasSubstr("64 x 48"));
@@ -179,13 +179,13 @@ TEST(ImageDamageTest, OtherFilesAreNamed) {
     const auto folder = read_image("/tmp");
     ASSERT_FALSE(folder);
     EXPECT_THAT(folder.error().message(), HasSubstr("folder"));
-    const auto text = read_image(bytes_of("hello"), "a.txt");
+    const auto text = read_image(file_bytes("hello"), "a.txt");
     ASSERT_FALSE(text);
     EXPECT_THAT(text.error().message(), HasSubstr("no picture format"));
-    const auto bytes = read_image_bytes(bytes_of(sample_radiance()), "sky.hdr");
+    const auto bytes = read_image_bytes(file_bytes(sample_radiance()), "sky.hdr");
     ASSERT_FALSE(bytes);
     EXPECT_EQ(bytes.error().code, ErrorCode::unsupported);
-    EXPECT_FALSE(read_exr_layers(bytes_of(sample_png()), "a.png"));
+    EXPECT_FALSE(read_exr_layers(file_bytes(sample_png()), "a.png"));
 }
 
 }  // namespace

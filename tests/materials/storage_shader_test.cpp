@@ -23,7 +23,7 @@ using closures::Library;
 constexpr std::uint32_t extra_words = 5;
 
 // The surface's frame is that of the world here.
-constexpr const char* main_text = R"(
+constexpr const char* store_text = R"(
 layout(set = 0, binding = 2, std430) writeonly buffer Results { uint results[]; };
 uint stored[stored_words];
 uint material_word(uint index) { return stored[index]; }
@@ -69,7 +69,7 @@ class StorageShaderTest : public TreeDeviceTest {
         TreeShader tree = tree_shader(flat);
         tree.defines += fmt::format("#define NACRE_STORED_FRAMES {}\n#define NACRE_STORED_LAYERS\n", layout.frames.size());
         const std::uint32_t words = layout.material_words(), stride = words + extra_words;
-        const auto bytes = run_tree(*device_, tree, tree.glsl + storage_writer(flat, layout) + main_text, directions,
+        const auto bytes = run_tree(*device_, tree, tree.glsl + storage_writer(flat, layout) + store_text, directions,
                                     std::size_t{4} * stride * direction_pairs);
         ASSERT_TRUE(bytes) << bytes.error().message();
         Library library;

@@ -15,7 +15,7 @@
 namespace nacre::materials {
 namespace {
 
-constexpr const char* main_text = R"(
+constexpr const char* evaluate_text = R"(
 layout(set = 0, binding = 2, std430) writeonly buffer Results { vec4 results[]; };
 void main() {
     uint i = gl_GlobalInvocationID.x;
@@ -34,7 +34,7 @@ class TreeShaderTest : public TreeDeviceTest {
   protected:
     Expected<std::vector<glm::vec4>> run(const TreeShader& tree, const std::vector<glm::vec4>& inputs) {
         NACRE_TRY(const std::vector<std::byte> bytes,
-                  run_tree(*device_, tree, tree.glsl + main_text, inputs, inputs.size() * sizeof(glm::vec4)));
+                  run_tree(*device_, tree, tree.glsl + evaluate_text, inputs, inputs.size() * sizeof(glm::vec4)));
         std::vector<glm::vec4> values(inputs.size());
         std::memcpy(values.data(), bytes.data(), bytes.size());
         return values;

@@ -4,7 +4,6 @@
 #include "materials/building_blocks.h"
 #include "materials/evaluation.h"
 #include "materials/simplification.h"
-#include "scene/shapes.h"
 #include "tests/passes/renderer_test.h"
 
 namespace nacre::test {
@@ -17,8 +16,6 @@ materials::MaterialDescription lamp(const glm::vec3& emission) {
     material.emissive = emission;
     return material;
 }
-
-scene::Primitive sheet(float z) { return scene::parallelogram({-1, -1, z}, {2, 0, 0}, {0, 2, 0}); }
 
 TEST_P(Emission, IsAddedToWhatIsReflected) {
     scene::Scene scene = empty_scene();

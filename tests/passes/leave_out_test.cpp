@@ -2,7 +2,6 @@
 #include <algorithm>
 
 #include "scene/builtin.h"
-#include "scene/shapes.h"
 #include "tests/passes/renderer_test.h"
 
 namespace nacre::test {
@@ -18,8 +17,6 @@ struct OptionalFeature {
     void (*add)(scene::Scene&);  ///< Makes the plain scene use it.
     void (*prepare)(scene::Scene&) = [](scene::Scene&) {};  ///< What the plain scene needs to be comparable.
 };
-
-scene::Primitive sheet(float z) { return scene::parallelogram({-1, -1, z}, {2, 0, 0}, {0, 2, 0}); }
 
 int add_image(scene::Scene& scene, scene::ColorSpace color_space) {
     scene::Image image{.name = "image", .color_space = color_space, .width = 2, .height = 2};

@@ -9,6 +9,7 @@
 #include "materials/closures/library.h"
 #include "passes/profiles.h"
 #include "samples/backends.h"
+#include "scene/shapes.h"
 
 namespace nacre::test {
 namespace {
@@ -221,6 +222,8 @@ void place(scene::Scene& scene, scene::Primitive primitive, std::uint32_t materi
                                .mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1),
                                .transforms = {transform}});
 }
+
+scene::Primitive sheet(float z) { return scene::parallelogram({-1, -1, z}, {2, 0, 0}, {0, 2, 0}); }
 
 scene::Light directional_light(const glm::vec3& direction, float lux) {
     scene::Light light{.name = "sun", .kind = scene::LightKind::directional, .intensity = lux};

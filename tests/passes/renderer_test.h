@@ -101,6 +101,8 @@ glm::dvec3 in_frame_of(const glm::dvec3& normal, const glm::dvec3& direction);
 /// Places a primitive with a material.
 void place(scene::Scene& scene, scene::Primitive primitive, std::uint32_t material,
            const glm::mat4& transform = glm::mat4(1.0f));
+/// 2 x 2 meters at height z, facing the camera.
+scene::Primitive sheet(float z);
 scene::Light directional_light(const glm::vec3& direction, float lux);
 
 #define RENDERER_SUITE_OF(Suite, variants)                           \

@@ -29,6 +29,8 @@
 
 namespace nacre::test {
 
+inline constexpr auto all_copies = rhi::TextureUsage::copy_source | rhi::TextureUsage::copy_destination;
+
 /// A device that the suite runs on.
 struct Variant {
     std::string name;     ///< "vulkan_renderpass"; part of the test's name and a column of docs/support.md.

@@ -10,7 +10,7 @@
 namespace nacre::rhi {
 namespace {
 
-using test::NullSetup;
+using nacre::test::NullSetup;
 
 BufferDesc storage(std::uint64_t size, std::string name) {
     return {size, BufferUsage::storage | BufferUsage::copy_destination, MemoryKind::device, std::move(name)};
@@ -78,7 +78,7 @@ TEST(Device, ObjectsInFlightOutliveTheirDestruction) {
 }
 
 TEST(Device, NothingIsLeftAfterADevice) {
-    std::shared_ptr<test::NullLog> log;
+    std::shared_ptr<nacre::test::NullLog> log;
     {
         NullSetup setup;
         log = setup.log;
@@ -184,11 +184,11 @@ class MissingBackend final : public Backend {
 };
 
 TEST(Instance, OneMissingDriverLeavesTheOthersUsable) {
-    const auto log = std::make_shared<test::NullLog>();
-    log->capabilities = test::full_capabilities();
+    const auto log = std::make_shared<nacre::test::NullLog>();
+    log->capabilities = nacre::test::full_capabilities();
     std::vector<std::unique_ptr<Backend>> backends;
     backends.push_back(std::make_unique<MissingBackend>());
-    backends.push_back(std::make_unique<test::NullBackend>(log));
+    backends.push_back(std::make_unique<nacre::test::NullBackend>(log));
     const Instance instance(std::move(backends));
     ASSERT_EQ(instance.adapters().size(), 1u);
     ASSERT_EQ(instance.unavailable().size(), 1u);

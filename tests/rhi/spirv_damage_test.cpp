@@ -40,7 +40,7 @@ Expected<ShaderReflection> try_reflect(const std::vector<std::uint32_t>& words,
     return reflect(words, stage, "main", "test module");
 }
 
-std::string error_of(const std::vector<std::uint32_t>& words) {
+std::string message_of(const std::vector<std::uint32_t>& words) {
     const auto result = try_reflect(words);
     return result ? "(no error)" : result.error().message();
 }
@@ -54,7 +54,7 @@ std::vector<std::uint32_t> assemble(const std::string& text, spv_target_env envi
 
 TEST(SpirvDamage, TheGoodModuleIsGood) { EXPECT_TRUE(try_reflect(good_shader().spirv)); }
 
-TEST(SpirvDamage, Empty) { EXPECT_THAT(error_of({}), HasSubstr("no words")); }
+TEST(SpirvDamage, Empty) { EXPECT_THAT(message_of({}), HasSubstr("no words")); }
 
 TEST(SpirvDamage, SizeThatIsNoMultipleOfFour) {
     const std::vector<std::byte> bytes(21);
@@ -70,22 +70,22 @@ TEST(SpirvDamage, SizeThatIsNoMultipleOfFour) {
 TEST(SpirvDamage, WrongMagicNumber) {
     auto words = good_shader().spirv;
     words[0] = 0xdeadbeef;
-    EXPECT_THAT(error_of(words), AllOf(HasSubstr("word 0"), HasSubstr("0xdeadbeef"), HasSubstr("0x07230203")));
+    EXPECT_THAT(message_of(words), AllOf(HasSubstr("word 0"), HasSubstr("0xdeadbeef"), HasSubstr("0x07230203")));
 }
 
 TEST(SpirvDamage, OtherByteOrder) {
     auto words = good_shader().spirv;
     for (std::uint32_t& word : words) word = __builtin_bswap32(word);
-    EXPECT_THAT(error_of(words), HasSubstr("other byte order"));
+    EXPECT_THAT(message_of(words), HasSubstr("other byte order"));
 }
 
 TEST(SpirvDamage, WrongVersionAndSchema) {
     auto words = good_shader().spirv;
     words[1] = 0x00020000;
-    EXPECT_THAT(error_of(words), HasSubstr("version"));
+    EXPECT_THAT(message_of(words), HasSubstr("version"));
     words = good_shader().spirv;
     words[4] = 1;
-    EXPECT_THAT(error_of(words), HasSubstr("schema"));
+    EXPECT_THAT(message_of(words), HasSubstr("schema"));
 }
 
 TEST(SpirvDamage, TruncatedAnywhere) {
@@ -96,21 +96,21 @@ TEST(SpirvDamage, TruncatedAnywhere) {
     }
     auto words = whole;
     words.pop_back();
-    EXPECT_THAT(error_of(words), HasSubstr("word "));
+    EXPECT_THAT(message_of(words), HasSubstr("word "));
 }
 
 TEST(SpirvDamage, InstructionOfNoWords) {
     auto words = good_shader().spirv;
     words[5] &= 0xffff;
-    EXPECT_THAT(error_of(words), HasSubstr("word 5: an instruction of no words"));
+    EXPECT_THAT(message_of(words), HasSubstr("word 5: an instruction of no words"));
 }
 
 TEST(SpirvDamage, HugeIdBound) {
     auto words = good_shader().spirv;
     words[3] = 0xffffffff;
-    EXPECT_THAT(error_of(words), AllOf(HasSubstr("word 3"), HasSubstr("id bound")));
+    EXPECT_THAT(message_of(words), AllOf(HasSubstr("word 3"), HasSubstr("id bound")));
     words[3] = 0;
-    EXPECT_THAT(error_of(words), HasSubstr("id bound"));
+    EXPECT_THAT(message_of(words), HasSubstr("id bound"));
     // The largest that is allowed is wasteful and right.
     words[3] = spirv::max_id_bound;
     EXPECT_TRUE(try_reflect(words));
@@ -119,7 +119,7 @@ TEST(SpirvDamage, HugeIdBound) {
 TEST(SpirvDamage, IdsBeyondTheBound) {
     auto words = good_shader().spirv;
     words[3] = 5;
-    EXPECT_THAT(error_of(words), HasSubstr("word "));
+    EXPECT_THAT(message_of(words), HasSubstr("word "));
 }
 
 TEST(SpirvDamage, ErrorsNameTheLineOfTheSource) {
@@ -128,7 +128,7 @@ TEST(SpirvDamage, ErrorsNameTheLineOfTheSource) {
     for (std::size_t at = 5; at < words.size(); at += words[at] >> 16) {
         if ((words[at] & 0xffff) != 57) continue;
         words[at + 3] = words[at + 1];
-        const std::string message = error_of(words);
+        const std::string message = message_of(words);
         EXPECT_THAT(message, HasSubstr("word " + std::to_string(at)));
         EXPECT_THAT(message, HasSubstr("good.comp:13"));
         return;
@@ -149,7 +149,7 @@ TEST(SpirvDamage, MissingEntryPointAndWrongStage) {
 }
 
 TEST(SpirvDamage, Recursion) {
-    EXPECT_THAT(error_of(assemble(R"(
+    EXPECT_THAT(message_of(assemble(R"(
         OpCapability Shader
         OpMemoryModel Logical GLSL450
         OpEntryPoint GLCompute %4 "main"
@@ -182,10 +182,10 @@ TEST(SpirvDamage, CapabilitiesThatNoBackendHas) {
     const auto geometry = assemble(R"(
         OpCapability Geometry
         OpMemoryModel Logical GLSL450)");
-    EXPECT_THAT(error_of(geometry), HasSubstr("capability Geometry is not supported"));
+    EXPECT_THAT(message_of(geometry), HasSubstr("capability Geometry is not supported"));
     auto unknown = geometry;
     unknown[6] = 6089;
-    EXPECT_THAT(error_of(unknown), HasSubstr("capability number 6089"));
+    EXPECT_THAT(message_of(unknown), HasSubstr("capability number 6089"));
 }
 
 TEST(SpirvDamage, ResourcesThatCannotBeBound) {
@@ -209,8 +209,8 @@ TEST(SpirvDamage, TypesThatWouldTakeAllTimeOrMemory) {
 )";
     for (int i = 101; i < 140; ++i)
         nested += "%" + std::to_string(i) + " = OpTypeStruct %" + std::to_string(i - 1) + " %" + std::to_string(i - 1) + "\n";
-    EXPECT_THAT(error_of(assemble(nested)), HasSubstr("nested members"));
-    EXPECT_THAT(error_of(assemble(R"(
+    EXPECT_THAT(message_of(assemble(nested)), HasSubstr("nested members"));
+    EXPECT_THAT(message_of(assemble(R"(
         OpCapability Shader
         OpMemoryModel Logical GLSL450
         %1 = OpTypeFloat 32

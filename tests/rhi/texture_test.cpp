@@ -12,8 +12,6 @@ using namespace rhi;
 
 BACKEND_SUITE(Textures);
 
-constexpr TextureUsage all_copies = TextureUsage::copy_source | TextureUsage::copy_destination;
-
 /// Bytes that are different for each seed and, as floats of any width, neither infinite nor NaN.
 std::vector<std::byte> bytes_for(std::uint64_t count, std::uint32_t seed) {
     std::mt19937 random(seed);

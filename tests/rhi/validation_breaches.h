@@ -17,6 +17,9 @@ inline const char* const storage_shader =
     "layout(local_size_x = 1) in; layout(set = 0, binding = 0) buffer Result { uint result[64]; }; void main() { "
     "result[0] = 1u; }";
 
+/// Has an input at location 0.
+inline const char* const input_vertex = "layout(location = 0) in vec4 a; void main() { gl_Position = a; }";
+
 /// Reads a texel buffer of integers without a format at binding 0, and writes one of r32ui at binding 1.
 inline const char* const texel_shader =
     "layout(local_size_x = 1) in; layout(set = 0, binding = 0) uniform usamplerBuffer a; layout(set = 0, binding = 1, r32ui) "

@@ -17,7 +17,6 @@ const char* const sampling_shader =
 const char* const push_shader =
     "layout(local_size_x = 1) in; layout(push_constant) uniform P { vec4 a; }; layout(set = 0, binding = 0) buffer "
     "Result { vec4 result[1]; }; void main() { result[0] = a; }";
-const char* const input_vertex = "layout(location = 0) in vec4 a; void main() { gl_Position = a; }";
 
 void pass_with(Bench& bench, const RenderPassDesc& desc) {
     CommandList list = bench.list();

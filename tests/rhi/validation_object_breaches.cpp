@@ -11,8 +11,6 @@ using enum Format;
 
 namespace {
 
-const char* const input_vertex = "layout(location = 0) in vec4 a; void main() { gl_Position = a; }";
-
 void texture_with(Bench& bench, const std::function<void(TextureDesc&)>& change) {
     TextureDesc desc = Bench::texture_desc(TextureUsage::sampled);
     change(desc);

@@ -7,8 +7,6 @@ namespace {
 
 using namespace rhi;
 
-constexpr TextureUsage all_copies = TextureUsage::copy_source | TextureUsage::copy_destination;
-
 BACKEND_SUITE(Views);
 
 TEST_P(Views, OneMipAndOneLayer) {

@@ -36,16 +36,6 @@ GltfBuilder file_with(const char* material) {
     return file;
 }
 
-Scene load_valid(const GltfBuilder& file) {
-    auto scene = file.load();
-    if (!scene) {
-        ADD_FAILURE() << scene.error().message();
-        return {};
-    }
-    expect_valid_scene(*scene);
-    return *std::move(scene);
-}
-
 std::string picture(const Scene& scene, const materials::TextureReference& texture) {
     return texture.present() ? scene.images.at(texture.image).name : "";
 }

@@ -14,16 +14,6 @@ using testing::HasSubstr;
 
 constexpr float pi = std::numbers::pi_v<float>;
 
-Scene load_valid(const GltfBuilder& file, const LoadOptions& options = {}) {
-    auto scene = file.load(options);
-    if (!scene) {
-        ADD_FAILURE() << scene.error().message();
-        return {};
-    }
-    expect_valid_scene(*scene);
-    return *std::move(scene);
-}
-
 void expect_near(const glm::vec3& actual, const glm::vec3& expected, float tolerance = 1e-5f) {
     EXPECT_LT(glm::length(actual - expected), tolerance)
         << "(" << actual.x << ", " << actual.y << ", " << actual.z << ") is not (" << expected.x << ", " << expected.y

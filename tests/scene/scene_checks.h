@@ -9,6 +9,7 @@
 #include <glm/matrix.hpp>
 
 #include "scene/scene.h"
+#include "tests/scene/gltf_builder.h"
 
 /// @file
 /// What scene/scene.h promises about every scene, as one check.
@@ -101,6 +102,17 @@ inline void expect_valid_scene(const Scene& scene) {
         EXPECT_NEAR(glm::length(light.direction), 1.0f, 1e-3f);
         EXPECT_LT(light.inner_cone_angle, light.outer_cone_angle);
     }
+}
+
+/// The scene of a file, which the test expects to load; empty where it does not.
+inline Scene load_valid(const GltfBuilder& file, const LoadOptions& options = {}) {
+    auto scene = file.load(options);
+    if (!scene) {
+        ADD_FAILURE() << scene.error().message();
+        return {};
+    }
+    expect_valid_scene(*scene);
+    return *std::move(scene);
 }
 
 }  // namespace nacre::scene

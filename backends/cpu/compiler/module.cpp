@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which instructions have results is told by a function of the SPIR-V headers.
-#define SPV_ENABLE_UTILITY_CODE
 #include "backends/cpu/compiler/module.h"
 
 #include <algorithm>

@@ -63,7 +63,8 @@ struct TileRun {
     // The record that is drawn.
     const Record* record = nullptr;
     const std::byte* vertex_memory = nullptr;
-    const PrimitiveData* primitive = nullptr;
+    const PrimitiveData* primitive = nullptr;  ///< Of the record; null: no fragment of it so far.
+    const PrimitiveData* tested = nullptr;     ///< The same in a slot that the next record may still get.
     std::uint32_t next_slot = 0;
     // Blocks that wait as a whole, in a draw that lets them. What waits there and in the stream are different blocks.
     bool keeps_whole = false;
@@ -271,7 +272,7 @@ struct TileRun {
 
     /// In double precision: depths of a sample of the pixels of the block at (x, y), clamped, and their keys.
     Ints double_keys(std::int32_t x, std::int32_t y, float offset_x, float offset_y, double (&depths)[16]) {
-        const DoublePrimitive& planes = double_primitive(current_primitive(), *draw);
+        const DoublePrimitive& planes = double_primitive(tested_primitive(), *draw);
         alignas(64) float rounded[16];
         for (std::uint32_t lane = 0; lane < 16; ++lane) {
             const double z = raster::depth_at(planes, x + lane_x[lane] + static_cast<double>(offset_x),
@@ -374,20 +375,31 @@ struct TileRun {
     void begin_record(const Record& next, const std::byte* vertices) {
         record = &next;
         vertex_memory = vertices;
-        primitive = nullptr;
+        primitive = tested = nullptr;
         front = (next.bits & Record::front_facing) != 0;
     }
 
+    /// Of the record: what fragments of it refer to. Has a slot from then on, for as long as they wait.
     const PrimitiveData& current_primitive() {
         if (!primitive) {
-            auto* const slot = reinterpret_cast<PrimitiveData*>(
-                memory.primitives + static_cast<std::size_t>(next_slot) * draw->primitive_bytes);
+            primitive = &tested_primitive();
             next_slot = (next_slot + 1) % primitive_slots;
-            set_up_primitive(*draw, *record, vertex_memory, *slot);
-            if (draw->in_double) set_up_double_primitive(*draw, targets.depth_layout, *record, vertex_memory, *slot);
-            primitive = slot;
         }
         return *primitive;
+    }
+
+    /// The same for those who only look: what comes to nothing leaves the slot to the next, else a long run of hidden
+    /// primitives would write over those whose fragments wait.
+    const PrimitiveData& tested_primitive() {
+        if (primitive) return *primitive;
+        if (!tested) {
+            auto* const slot = reinterpret_cast<PrimitiveData*>(
+                memory.primitives + static_cast<std::size_t>(next_slot) * draw->primitive_bytes);
+            set_up_primitive(*draw, *record, vertex_memory, *slot);
+            if (draw->in_double) set_up_double_primitive(*draw, targets.depth_layout, *record, vertex_memory, *slot);
+            tested = slot;
+        }
+        return *tested;
     }
 
     /// The quads of a block of 4x4 pixels.

@@ -35,7 +35,7 @@ class Picture {
     }
 
     void draw(GraphicsPipelineDesc desc, const std::string& vertex, const std::string& fragment, std::uint32_t draws,
-              Buffer vertices = {}) {
+              Buffer vertices = {}, std::uint32_t vertex_count = 3) {
         desc.vertex = bench_.shader("test.vert", vertex), desc.fragment = bench_.shader("test.frag", fragment);
         desc.samples = samples_;
         const bool has_depth = desc.depth_stencil.format != Format::undefined;
@@ -49,7 +49,7 @@ class Picture {
         list.begin_render_pass(pass);
         list.set_pipeline(pipeline);
         if (vertices) list.set_vertex_buffer(0, vertices, 0);
-        for (std::uint32_t i = 0; i < draws; ++i) list.draw({.vertex_count = 3});
+        for (std::uint32_t i = 0; i < draws; ++i) list.draw({.vertex_count = vertex_count});
         list.end_render_pass();
         bench_.run(std::move(list));
     }
@@ -113,6 +113,34 @@ TEST(DoubleMode, ValuesBetweenTheStagesAreInterpolatedInDouble) {
             EXPECT_NEAR(found[at + 3], 1.0 / 3 + 5, 1e-15) << x << " " << y;
             EXPECT_NEAR(depths[at], linear, 1e-14) << x << " " << y;
         }
+}
+
+TEST(DoubleMode, WhatIsHiddenLeavesWhatWaitsAsItIs) {
+    Bench bench("cpu:double");
+    Picture picture(bench);
+    GraphicsPipelineDesc desc;
+    desc.color_targets = {{.format = Format::rgba32_float}};
+    desc.depth_stencil = {
+        .format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::less};
+    // The first is near; the others lie behind it, many more than a tile can keep.
+    constexpr std::uint32_t triangles = 1000;
+    picture.draw(desc,
+                 "layout(location = 0) out float number;\n"
+                 "void main() { int triangle = gl_VertexIndex / 3, corner = gl_VertexIndex % 3;\n"
+                 "number = float(triangle + 1);\n"
+                 "gl_Position = vec4(corner == 1 ? 0.0 : -0.6, corner == 2 ? 0.0 : -0.6, triangle == 0 ? 0.1 : 0.5, 1.0); }\n",
+                 "layout(location = 0) in float number;\n"
+                 "layout(location = 0) out vec4 color;\n"
+                 "void main() { color = vec4(number); }\n",
+                 1, {}, 3 * triangles);
+    const std::vector<double> found = picture.texels(), depths = picture.texels(true);
+    std::uint32_t covered = 0;
+    for (std::size_t at = 0; at < found.size(); at += 4) {
+        if (depths[at] == 1.0) continue;
+        ++covered;
+        EXPECT_NEAR(found[at], 1.0, 1e-12) << at / 4;
+    }
+    EXPECT_GT(covered, 4u);
 }
 
 TEST(DoubleMode, ArraysAndStructsBetweenTheStagesKeepDoublesWhateverTheIndex) {

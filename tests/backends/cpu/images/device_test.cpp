@@ -474,9 +474,6 @@ std::vector<SampleCase> shapes_where(Accepts accepts) {
     }
     return result;
 }
-bool is_cube(ViewDimension dimension) {
-    return dimension == ViewDimension::cube || dimension == ViewDimension::cube_array;
-}
 bool is_2d(ViewDimension dimension) { return dimension == ViewDimension::d2 || dimension == ViewDimension::d2_array; }
 const auto name_of = [](const testing::TestParamInfo<SampleCase>& each) { return std::string(each.param.name); };
 

@@ -22,9 +22,6 @@ int axes_of(ViewDimension dimension) {
         default: return 3;
     }
 }
-bool is_cube(ViewDimension dimension) {
-    return dimension == ViewDimension::cube || dimension == ViewDimension::cube_array;
-}
 
 double coordinate(const Point& point, int axis) {
     return std::bit_cast<float>(point.coordinates[static_cast<std::size_t>(axis)]);

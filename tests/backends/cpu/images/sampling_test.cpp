@@ -31,9 +31,6 @@ constexpr Shape shapes[] = {
     {"single_texel_cube", ViewDimension::cube, 1, 1, 1, 6},
 };
 
-bool is_cube(ViewDimension dimension) {
-    return dimension == ViewDimension::cube || dimension == ViewDimension::cube_array;
-}
 bool has_layers(const Shape& shape) {
     using enum ViewDimension;
     return shape.dimension == d1_array || shape.dimension == d2_array || shape.dimension == cube_array;

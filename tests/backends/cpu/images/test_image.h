@@ -31,6 +31,10 @@ inline std::uint32_t random_below(Random& random, std::uint32_t count) {
     return static_cast<std::uint32_t>(random() % count);
 }
 
+inline bool is_cube(rhi::ViewDimension dimension) {
+    return dimension == rhi::ViewDimension::cube || dimension == rhi::ViewDimension::cube_array;
+}
+
 struct ImageShape {
     rhi::Format format = rhi::Format::rgba8_unorm;
     rhi::ViewDimension dimension = rhi::ViewDimension::d2;
