@@ -126,7 +126,12 @@ TEST(ClosureSampling, SamplesBelowALayerFollowTheDensity) {
             const glm::dvec3 view = direction(cosine, 0.4);
             const auto inside = library.prepare_closure(Library::slab_of(test.slab),
                                                         library.refracted_direction(view, 0.5), 1e-3);
-            const auto closure = library.cover_closure(inside, {.spread = glm::dvec3(0.2), .mean = glm::dvec3(0.5), .kept = glm::dvec3(1.0), .bend = 0.0, .ior_excess = 0.5, .view_cosine = cosine});
+            const auto closure = library.cover_closure(inside, {.spread = glm::dvec3(0.2),
+                                                                .mean = glm::dvec3(0.5),
+                                                                .kept = glm::dvec3(1.0),
+                                                                .bend = 0.0,
+                                                                .ior_excess = 0.5,
+                                                                .view_cosine = cosine});
             EXPECT_GT(smallest_probability(library, closure, narrowest_angle(test.slab, cosine), samples, ++seed),
                       limit)
                 << test.name << " seen at cosine " << cosine;

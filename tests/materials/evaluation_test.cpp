@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -236,6 +237,7 @@ TEST(TreeLayer, LobesBelowACoatAreRefracted) {
             walked.finish();
             closures::Library::Closure once = shade(flat, view_at(cosine)).closures[1].closure;
             once.again = closures::Library().scaled_lobe(once.again, glm::dvec3(0.0));
+            once.ring = glm::dvec3(0.0);
             constexpr int rings = 250, sectors = 200;
             for (int i = 0; i < rings * sectors; ++i) {
                 const double z = (i / sectors + 0.5) / rings, radius = std::sqrt(1.0 - z * z);
@@ -249,6 +251,61 @@ TEST(TreeLayer, LobesBelowACoatAreRefracted) {
             EXPECT_NEAR(shaded.across, walked.across, 0.03 * walked.across) << roughness << " at " << cosine;
         }
     }
+}
+
+// Light towards the normal by the cosine it comes at, in rings of equal steps: of the walk, and of the closures.
+struct Rings {
+    static constexpr int count = 4;
+    std::array<double, count> walked{}, shaded{};
+};
+
+Rings rings_of(const FlattenedTree& flat) {
+    closures::Lobes lobes;
+    Rings rings;
+    constexpr int paths = 300'000, steps = 4000;
+    const RandomWalk walk(flat);
+    RandomWalk::Generator random(1);
+    for (int i = 0; i < paths; ++i) {
+        const WalkExit path = walk.walk(view_at(1.0), random);
+        if (path.direction.z > 0.0)
+            rings.walked[std::min(static_cast<int>(path.direction.z * Rings::count), Rings::count - 1)] +=
+                path.weight.x / paths;
+    }
+    const ShadedTree shaded = shade(flat, view_at(1.0));
+    for (int i = 0; i < steps; ++i) {
+        const double cosine = (i + 0.5) / steps;
+        rings.shaded[i * Rings::count / steps] +=
+            2.0 * lobes.pi / steps * reflected(shaded, {std::sqrt(1.0 - cosine * cosine), 0.0, cosine}).x;
+    }
+    return rings;
+}
+
+FlattenedTree dusty(const Slab& base) {
+    Tree tree{.name = "dusty"};
+    Slab dust{.f0 = glm::vec3(0.0f), .albedo = glm::vec3(0.5f)};
+    dust.features = slab_medium;
+    dust.thickness = 1e-3f;
+    dust.mean_free_path = glm::vec3(1e-3f / 0.3f);
+    const NodeIndex ground = tree.add(base);
+    tree.layer(tree.add(dust), ground);
+    return *flatten(tree);
+}
+
+// A thin medium scatters more along the surface than Lambert's law has it (which gives the last ring seven times the
+// light of the first).
+TEST(TreeLayer, ThinMediaScatterAlongTheSurface) {
+    const Rings rings = rings_of(dusty({.f0 = glm::vec3(0.0f), .albedo = glm::vec3(0.0f)}));
+    EXPECT_LT(rings.walked[3], 3.0 * rings.walked[0]);
+    for (int i = 0; i < Rings::count; ++i)
+        EXPECT_NEAR(rings.shaded[i], rings.walked[i], 0.1 * rings.walked[i]) << i;
+}
+
+// What a lobe sends through dust goes straight or is scattered, each by its own share.
+TEST(TreeLayer, DustScattersWhatALobeSends) {
+    const Rings rings =
+        rings_of(dusty({.f0 = glm::vec3(0.9f), .roughness = 0.3f, .albedo = glm::vec3(0.0f)}));
+    for (int i = 0; i < Rings::count; ++i)
+        EXPECT_NEAR(rings.shaded[i], rings.walked[i], (i == 3 ? 0.02 : 0.15) * rings.walked[i]) << i;
 }
 
 }  // namespace
