@@ -2,9 +2,12 @@
 #include "measure/chi_square.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <numeric>
+#include <utility>
 
 namespace nacre::measure {
 namespace {
@@ -34,62 +37,149 @@ int ChiSquareTest::bin_of(const glm::dvec3& direction) const {
            std::clamp(static_cast<int>(phi / (2.0 * std::numbers::pi) * sectors_), 0, sectors_ - 1);
 }
 
-glm::dvec3 ChiSquareTest::direction_at(double ring, double sector) const {
-    const double angle = angle_at(ring), phi = 2.0 * std::numbers::pi * sector / sectors_;
-    return std::sin(angle) * (std::cos(phi) * frame_.right + std::sin(phi) * frame_.up) + std::cos(angle) * frame_.axis;
+// A part of a bin on one side of the surface: sectors from phi[0] to phi[1], and in each of them from `part[0]` to
+// `part[1]` of the way between the angles where the bin begins and ends on that side.
+struct ChiSquareTest::Cell {
+    double angles[2];  // of the bin
+    bool is_behind;    // the surface, seen from the axis
+    double part[2], phi[2];
+    double sum = 0.0;              // by three nodes of Gauss along either direction
+    double bend[2] = {0.0, 0.0};   // second differences along part and phi
+};
+
+void ChiSquareTest::measure(Cell& cell) {
+    constexpr double nodes[3] = {0.5 - 0.38729833462074169, 0.5, 0.5 + 0.38729833462074169};
+    constexpr double weights[3] = {5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
+    double values[3][3];
+    cell.sum = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        const double phi = std::lerp(cell.phi[0], cell.phi[1], nodes[i]);
+        const glm::dvec3 outwards = std::cos(phi) * frame_.right + std::sin(phi) * frame_.up;
+        // Where the sector meets the surface: cos(angle) axis.z + sin(angle) outwards.z = 0.
+        const double surface = std::atan2(std::abs(frame_.axis.z), frame_.axis.z > 0.0 ? -outwards.z : outwards.z);
+        const double from = cell.is_behind ? std::max(surface, cell.angles[0]) : cell.angles[0];
+        const double to = cell.is_behind ? cell.angles[1] : std::min(surface, cell.angles[1]);
+        const double length = std::max(to - from, 0.0);
+        for (int j = 0; j < 3; ++j) {
+            const double angle = from + length * std::lerp(cell.part[0], cell.part[1], nodes[j]);
+            const double sine = std::sin(angle);
+            values[i][j] = length > 0.0 ? length * sine * density_(sine * outwards + std::cos(angle) * frame_.axis) : 0.0;
+            cell.sum += weights[i] * weights[j] * values[i][j];
+        }
+    }
+    evaluations_ += 9;
+    cell.sum *= (cell.phi[1] - cell.phi[0]) * (cell.part[1] - cell.part[0]);
+    cell.bend[0] = cell.bend[1] = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        cell.bend[0] += std::abs(values[i][0] - 2.0 * values[i][1] + values[i][2]);
+        cell.bend[1] += std::abs(values[0][i] - 2.0 * values[1][i] + values[2][i]);
+    }
 }
 
-// Integral of the density over a part of a bin, halving it until its midpoints agree.
-double ChiSquareTest::integral(const std::function<double(const glm::dvec3&)>& density, double ring, double sector,
-                               double ring_size, double sector_size, int depth) const {
-    const auto sum = [&](int count) {
-        double result = 0.0;
-        for (int i = 0; i < count; ++i) {
-            const double low = ring + ring_size * i / count, high = ring + ring_size * (i + 1) / count;
-            // 1 - cos by half angles.
-            const double area =
-                2.0 * (std::pow(std::sin(0.5 * angle_at(high)), 2.0) - std::pow(std::sin(0.5 * angle_at(low)), 2.0)) *
-                2.0 * std::numbers::pi * sector_size / count / sectors_;
-            for (int j = 0; j < count; ++j)
-                result += area * density(direction_at(ring + ring_size * (i + 0.5) / count,
-                                                      sector + sector_size * (j + 0.5) / count));
-        }
+// The integral over a measured cell, which is halved along the direction of the larger bend, and where that changes
+// nothing along the other one, until neither does.
+double ChiSquareTest::refined(const Cell& cell, double tolerance, int depth) {
+    const auto halves = [this](const Cell& whole, bool is_along_phi) {
+        std::array<Cell, 2> result{whole, whole};
+        double(Cell::*const range)[2] = is_along_phi ? &Cell::phi : &Cell::part;
+        (result[0].*range)[1] = (result[1].*range)[0] = std::midpoint((whole.*range)[0], (whole.*range)[1]);
+        for (Cell& half : result) measure(half);
         return result;
     };
-    double lowest = 1.0, highest = -1.0;
-    for (int corner = 0; corner < 5; ++corner) {
-        const double z = corner == 4
-                             ? direction_at(ring + 0.5 * ring_size, sector + 0.5 * sector_size).z
-                             : direction_at(ring + ring_size * (corner & 1), sector + sector_size * (corner >> 1)).z;
-        lowest = std::min(lowest, z);
-        highest = std::max(highest, z);
-    }
-    // Densities end at the surface, and some lobes lie along it: midpoints may all miss that.
-    const bool is_at_surface = lowest < 0.1 && highest > 0.0 && highest - lowest > 0.02 * highest;
-    const double coarse = sum(2), fine = sum(4);
-    const bool is_fine_enough = std::abs(coarse - fine) < bins_.tolerance * fine + 2.5e-3 * bins_.tolerance * bins_.tolerance;
-    if (depth == 0 || (!(is_at_surface && depth > bins_.subdivisions * 3 / 5) && is_fine_enough))
-        return fine + (fine - coarse) / 3.0;
+    const bool is_along_phi = cell.bend[1] > cell.bend[0];
+    const std::array<Cell, 2> two = halves(cell, is_along_phi);
+    const double by_two = two[0].sum + two[1].sum;
+    // The sums are much nearer to the integral than to each other.
+    const double below = std::numbers::sqrt2 * 0.5 * tolerance;
+    if (depth > 0 && std::abs(by_two - cell.sum) > tolerance)
+        return refined(two[0], below, depth - 1) + refined(two[1], below, depth - 1);
+    const std::array<std::array<Cell, 2>, 2> four = {halves(two[0], !is_along_phi), halves(two[1], !is_along_phi)};
     double result = 0.0;
-    for (int i = 0; i < 2; ++i)
-        for (int j = 0; j < 2; ++j)
-            result += integral(density, ring + 0.5 * i * ring_size, sector + 0.5 * j * sector_size, 0.5 * ring_size,
-                               0.5 * sector_size, depth - 1);
+    for (int i = 0; i < 2; ++i) {
+        const double by_halves = four[i][0].sum + four[i][1].sum;
+        result += depth > 0 && std::abs(by_halves - two[i].sum) > below
+                      ? refined(four[i][0], 0.5 * tolerance, depth - 1) + refined(four[i][1], 0.5 * tolerance, depth - 1)
+                      : by_halves;
+    }
     return result;
 }
 
-ChiSquareTest::ChiSquareTest(const DirectionBins& bins, const std::function<double(const glm::dvec3&)>& density)
-    : bins_(bins), sectors_(2 * bins.rings) {
+// What an integral may be off by: a share of the standard deviation of the count. Bins of few samples are pooled until
+// there are 5, with errors that may all have one sign.
+double ChiSquareTest::tolerance_of(double share, double observed) const {
+    const double samples = kept_ + lost_, count = std::max(samples * share, observed);
+    return bins_.tolerance * std::max(std::min(std::sqrt(count), count / std::sqrt(5.0)), 0.01) / samples;
+}
+
+double ChiSquareTest::integral(int ring, int sector, int parts) {
+    constexpr int depth = 24;
+    const double angles[2] = {angle_at(ring), angle_at(ring + 1)};
+    std::array<double, 6> marks;
+    int count = 0;
+    const double from = 2.0 * std::numbers::pi * sector / sectors_, to = 2.0 * std::numbers::pi * (sector + 1) / sectors_;
+    marks[count++] = from;
+    // Where the surface enters and leaves the bin.
+    const double tilt = std::hypot(frame_.right.z, frame_.up.z), lowest = std::atan2(frame_.up.z, frame_.right.z);
+    for (const double angle : angles) {
+        const double cosine = -frame_.axis.z * std::cos(angle) / (tilt * std::sin(angle));
+        if (!(std::abs(cosine) < 1.0)) continue;
+        for (const double side : {-1.0, 1.0}) {
+            const double turn = lowest + side * std::acos(cosine) - from;
+            const double phi = from + turn - 2.0 * std::numbers::pi * std::floor(turn / (2.0 * std::numbers::pi));
+            if (phi < to && count < 5) marks[count++] = phi;
+        }
+    }
+    marks[count++] = to;
+    std::sort(marks.begin(), marks.begin() + count);
+    std::vector<Cell> cells;
+    double share = 0.0;
+    for (int i = 0; i + 1 < count; ++i) {
+        if (!(marks[i + 1] > marks[i])) continue;
+        for (const bool is_behind : {false, true}) {
+            for (int p = 0; p < parts * parts; ++p) {
+                const double step = 1.0 / parts, x = p % parts * step, y = p / parts * step;
+                Cell cell{.angles = {angles[0], angles[1]},
+                          .is_behind = is_behind,
+                          .part = {x, x + step},
+                          .phi = {std::lerp(marks[i], marks[i + 1], y), std::lerp(marks[i], marks[i + 1], y + step)}};
+                measure(cell);
+                share += cell.sum;
+                // Nothing there: the bin does not reach to this side of the surface, or the density does not.
+                if (cell.sum > 0.0) cells.push_back(cell);
+            }
+        }
+    }
+    const double tolerance = tolerance_of(share, observed_[ring * sectors_ + sector]) / parts;
+    double result = 0.0;
+    for (const Cell& cell : cells) result += refined(cell, tolerance, depth);
+    return std::max(result, 0.0);
+}
+
+void ChiSquareTest::integrate() {
+    const double samples = kept_ + lost_;
+    if (integrated_ == samples) return;
+    integrated_ = samples;
+    total_ = 0.0;
+    for (int ring = 0; ring < bins_.rings; ++ring) {
+        for (int sector = 0; sector < sectors_; ++sector) {
+            const int bin = ring * sectors_ + sector;
+            double share = integral(ring, sector, 1);
+            // Either the samples are wrong, or all nodes missed a peak: looking more closely hurts neither.
+            const double off = std::abs(observed_[bin] - samples * share);
+            if (off > 4.0 * std::sqrt(std::max(samples * share, 1.0))) share = integral(ring, sector, 8);
+            total_ += expected_[bin] = share;
+        }
+    }
+}
+
+ChiSquareTest::ChiSquareTest(const DirectionBins& bins, std::function<double(const glm::dvec3&)> density)
+    : bins_(bins), density_(std::move(density)), sectors_(2 * bins.rings) {
     frame_.axis = bins.axis;
     const glm::dvec3 helper = std::abs(bins.axis.z) < 0.9 ? glm::dvec3(0.0, 0.0, 1.0) : glm::dvec3(1.0, 0.0, 0.0);
     frame_.right = glm::normalize(glm::cross(helper, bins.axis));
     frame_.up = glm::cross(frame_.axis, frame_.right);
     expected_.resize(static_cast<std::size_t>(bins_.rings) * sectors_);
     observed_.resize(expected_.size());
-    for (int ring = 0; ring < bins_.rings; ++ring)
-        for (int sector = 0; sector < sectors_; ++sector)
-            total_ += expected_[ring * sectors_ + sector] =
-                std::max(integral(density, ring, sector, 1.0, 1.0, bins_.subdivisions), 0.0);
 }
 
 void ChiSquareTest::add(const glm::dvec3& direction) {
@@ -97,7 +187,8 @@ void ChiSquareTest::add(const glm::dvec3& direction) {
     ++kept_;
 }
 
-double ChiSquareTest::smallest_probability(double scale) const {
+double ChiSquareTest::smallest_probability(double scale) {
+    integrate();
     const double samples = kept_ + lost_;
     double smallest = 1.0;
     for (const int merged : {1, 4, 8, bins_.rings}) {

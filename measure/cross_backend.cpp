@@ -7,10 +7,10 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <ranges>
 
 #include "measure/closure_comparison.h"
 
@@ -75,10 +75,10 @@ bool is_more_precise(const Contestant& reference, const Contestant& test) {
            reference.rhi_device->capabilities().float_bits > test.rhi_device->capabilities().float_bits;
 }
 
-// What the invocation that made a texel computed on one device; the last pass that writes the texture counts.
-Expected<rhi::InvocationTrace> trace_texel(const Contestant& contestant, const std::string& pass,
+// What the invocation of a shader that made a texel computed on one device; the last one counts.
+Expected<rhi::InvocationTrace> trace_texel(const Contestant& contestant, const std::string& shader,
                                            const WrongValue& texel) {
-    rhi::TraceRequest request{.shader = pass, .x = texel.x, .y = texel.y, .z = texel.layer};
+    rhi::TraceRequest request{.shader = shader, .x = texel.x, .y = texel.y, .z = texel.layer};
     const auto run = [&]() -> Expected<rhi::Trace> {
         NACRE_CHECK(contestant.rhi_device->start_trace(request));
         auto frame = contestant.renderer.render_frame();
@@ -93,7 +93,7 @@ Expected<rhi::InvocationTrace> trace_texel(const Contestant& contestant, const s
     }
     if (trace.invocations.empty())
         return fail(ErrorCode::not_found, "trace texel", fmt::format("({}, {})", texel.x, texel.y),
-                    fmt::format("no shader of pass '{}' made it", pass));
+                    fmt::format("'{}' did not make it", shader));
     return std::move(trace.invocations.back());
 }
 
@@ -117,25 +117,28 @@ Expected<ErrorOrigin> origin_of(const Contestant& reference, const Contestant& t
     std::string writers;
     for (const IntermediateDescription& description : test.renderer.intermediates())
         if (description.name == error.texture) writers = description.written_by;
-    // The last pass that made the texel counts. Its shaders lie in a folder of their own.
+    // The last pass that made the texel counts, and in it the shader that is bound last.
     Expected<ErrorOrigin> result =
         fail(ErrorCode::not_found, "trace texel", fmt::format("'{}'", error.texture), "no shader makes it");
     while (!writers.empty()) {
         const std::size_t comma = writers.rfind(", ");
         const std::string last = comma == std::string::npos ? writers : writers.substr(comma + 2);
         writers.resize(comma == std::string::npos ? 0 : comma);
-        std::string folder;
+        std::vector<std::string> shaders;
         for (const passes::PlannedPass& pass : test.renderer.plan().passes)
-            if (pass.name == last && !pass.shaders.empty())
-                folder = std::filesystem::path(pass.shaders.front().path).parent_path().filename().string();
-        if (folder.empty()) continue;
-        const auto from = trace_texel(reference, folder, error.largest);
-        const auto to = from ? trace_texel(test, folder, error.largest) : from;
-        if (to) {
-            made_by = last;
-            return origin_of(*from, *to, error.largest);
+            if (pass.name == last)
+                for (const passes::PlannedShader& shader : pass.shaders)
+                    if (!shader.path.ends_with(".vert") && std::ranges::find(shaders, shader.path) == shaders.end())
+                        shaders.push_back(shader.path);
+        for (const std::string& shader : shaders | std::views::reverse) {
+            const auto from = trace_texel(reference, shader, error.largest);
+            const auto to = from ? trace_texel(test, shader, error.largest) : from;
+            if (to) {
+                made_by = last;
+                return origin_of(*from, *to, error.largest);
+            }
+            result = std::unexpected(to.error());
         }
-        result = std::unexpected(to.error());
     }
     return result;
 }

@@ -215,6 +215,7 @@ Expected<void> measure_furnaces(const StabilitySubject& subject, bool is_short, 
     if (subject.furnace) {
         NACRE_TRY(const auto range, subject.furnace(is_short));
         row.has_furnace = true;
+        row.has_lossless = subject.is_furnace_lossless;
         row.furnace_min = range.first;
         row.furnace_max = range.second;
         return {};
@@ -240,6 +241,38 @@ Expected<void> measure_furnaces(const StabilitySubject& subject, bool is_short, 
     return {};
 }
 
+// One slab and view whose samples are tested, and what they are tested with.
+struct SamplerTest {
+    SamplerTest(const SamplingCase& sampling, bool is_short) : view(glm::vec3(direction(sampling.cosine, sampling.azimuth))) {
+        Library library;
+        library.tints = stability_tint;
+        const auto closure = library.prepare_closure(Library::slab_of(sampling.slab), view, 1e-3f);
+        const glm::dvec2 alphas = closure.specular.alpha;
+        // Along the surface a lobe is as thin as the view is low.
+        const double narrowest = std::min(alphas.x, alphas.y) * std::max(sampling.cosine, 0.02);
+        chi_square.emplace(DirectionBins{.rings = is_short ? 40 : 80,
+                                         .axis = {-view.x, -view.y, view.z},
+                                         .smallest_angle = std::clamp(narrowest, 1e-5, 1.0)},
+                           [library, closure](const glm::dvec3& w) mutable { return library.closure_pdf(closure, w); });
+    }
+    void add(std::span<const float> results) {
+        for (std::size_t i = 0; i < results.size(); i += 8) {
+            const float* const s = &results[i];
+            const double weight = std::max({s[3], s[4], s[5]});
+            sum += weight;
+            squares += weight * weight;
+            weight_max = std::max(weight_max, weight);
+            if (s[6] <= 0.0f || s[7] > 0.5f) chi_square->add_lost();
+            else chi_square->add(glm::normalize(glm::dvec3(s[0], s[1], s[2])));
+        }
+    }
+
+    glm::dvec3 view;
+    std::optional<ChiSquareTest> chi_square;
+    double sum = 0.0, squares = 0.0, weight_max = 0.0;  ///< Of the samples' weights.
+    double probability = 1.0, probability_of_wrong = 1.0;
+};
+
 // Samples of the device in single precision against the density of the host in double precision. first_sample: their
 // number among those of all tests, so that no two tests have random numbers in common.
 Expected<void> test_samplers(rhi::Device& device, const StabilitySubject& subject, std::uint64_t samples,
@@ -250,61 +283,41 @@ Expected<void> test_samplers(rhi::Device& device, const StabilitySubject& subjec
     sampled.shader.result_words = 8;
     NACRE_TRY(PointShader shader, PointShader::make(device, variant(sampled, "SAMPLES", false)));
     const std::size_t stride = is_short ? 5 : 1;
-    const auto view_of = [](const SamplingCase& test) {
-        return glm::dvec3(glm::vec3(direction(test.cosine, test.azimuth)));
-    };
-    // The integrals of densities over bins take most of the time.
-    std::vector<std::optional<ChiSquareTest>> tests((subject.samplings.size() + stride - 1) / stride);
-    for_all(tests.size(), [&](std::size_t i) {
-        const SamplingCase& test = subject.samplings[i * stride];
-        const glm::dvec3 view = view_of(test);
-        Library library;
-        library.tints = stability_tint;
-        const auto closure = library.prepare_closure(Library::slab_of(test.slab), view, 1e-3f);
-        const glm::dvec2 alphas = closure.specular.alpha;
-        const double alpha = std::min(alphas.x, alphas.y);
-        // Needles take many halvings of a bin: minutes, which only the full test has.
-        if (is_short && std::max(alphas.x, alphas.y) > 20.0 * alpha) return;
-        tests[i].emplace(DirectionBins{.rings = is_short ? 40 : 80,
-                                       .axis = {-view.x, -view.y, view.z},
-                                       // Along the surface a lobe is as thin as the view is low.
-                                       .smallest_angle = std::clamp(alpha * std::max(test.cosine, 0.02), 1e-5, 1.0),
-                                       .tolerance = is_short ? 1e-3 : 2e-5,
-                                       .subdivisions = is_short ? 10 : 13},
-                         [&](const glm::dvec3& w) { return library.closure_pdf(closure, w); });
-    });
+    std::vector<SamplerTest> tests;
     for (std::size_t c = 0; c < subject.samplings.size(); c += stride) {
-        const SamplingCase& test = subject.samplings[c];
-        if (!tests[c / stride]) continue;
-        ChiSquareTest& chi_square = *tests[c / stride];
-        std::vector<std::uint32_t> point(subject.shader.point_words * std::size_t{batch_points}, 0u);
-        subject.make_sampling(test.slab, view_of(test), point.data());
-        std::vector<float> results;
-        double sum = 0.0, squares = 0.0;
+        tests.emplace_back(subject.samplings[c], is_short);
+        std::vector<std::uint32_t> point(subject.shader.point_words, 0u);
+        subject.make_sampling(subject.samplings[c].slab, tests.back().view, point.data());
+        std::vector<float> results, last;
+        std::future<void> added;
         for (std::uint64_t done = 0; done < samples; done += batch_points) {
             const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(batch_points, samples - done));
             point[subject.number_word] = static_cast<std::uint32_t>(first_sample + c / stride * samples + done);
-            NACRE_CHECK(shader.run(std::span(point).first(subject.shader.point_words), {}, {}, count, results));
-            for (std::uint32_t i = 0; i < count; ++i) {
-                const float* const s = &results[std::size_t{i} * 8];
-                const double weight = std::max({s[3], s[4], s[5]});
-                sum += weight;
-                squares += weight * weight;
-                row.all.weight_max = std::max(row.all.weight_max, weight);
-                if (s[6] <= 0.0f || s[7] > 0.5f) chi_square.add_lost();
-                else chi_square.add(glm::normalize(glm::dvec3(s[0], s[1], s[2])));
-            }
+            NACRE_CHECK(shader.run(point, {}, {}, count, results));
+            // Counted while the device works on.
+            if (added.valid()) added.get();
+            std::swap(results, last);
+            added = std::async(std::launch::async, [&test = tests.back(), &last] { test.add(last); });
         }
-        const double mean = sum / static_cast<double>(samples);
-        row.weight_variance = std::max(row.weight_variance, squares / static_cast<double>(samples) - mean * mean);
-        const double probability = chi_square.smallest_probability();
+        if (added.valid()) added.get();
+    }
+    for_all(tests.size(), [&](std::size_t i) {
+        tests[i].probability = tests[i].chi_square->smallest_probability();
+        tests[i].probability_of_wrong = tests[i].chi_square->smallest_probability(1.01);
+    });
+    for (std::size_t i = 0; i < tests.size(); ++i) {
+        const SamplerTest& test = tests[i];
+        const SamplingCase& sampling = subject.samplings[i * stride];
+        const double mean = test.sum / static_cast<double>(samples);
+        row.all.weight_max = std::max(row.all.weight_max, test.weight_max);
+        row.weight_variance = std::max(row.weight_variance, test.squares / static_cast<double>(samples) - mean * mean);
         ++row.chi2_tests;
-        if (probability < limit) ++row.chi2_failures;
-        if (chi_square.smallest_probability(1.01) >= limit) ++row.chi2_blind;
-        if (probability < row.chi2_probability) {
-            row.chi2_probability = probability;
+        if (test.probability < limit) ++row.chi2_failures;
+        if (test.probability_of_wrong >= limit) ++row.chi2_blind;
+        if (test.probability < row.chi2_probability) {
+            row.chi2_probability = test.probability;
             row.chi2_at = fmt::format("roughness {:.3g}, anisotropy {:.3g}, view cosine {:.3g}: {:.2g}",
-                                      test.slab.roughness, test.slab.anisotropy, test.cosine, probability);
+                                      sampling.slab.roughness, sampling.slab.anisotropy, sampling.cosine, test.probability);
         }
     }
     return {};
@@ -455,8 +468,9 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
         }
         NACRE_CHECK(measure_furnaces(subject, is_short, *row));
         NACRE_CHECK(test_samplers(*devices.front(), subject, report.samples, first, is_short, limit, *row));
+        report.seconds = seconds_since(start);
+        if (desc.on_progress) desc.on_progress(report);
     }
-    report.seconds = seconds_since(start);
     return report;
 }
 
@@ -474,6 +488,8 @@ std::vector<std::string> violations_of(const StabilityReport& report) {
         if (f.closed_error > c.tolerance) add(c, fmt::format("off the closed form by {:.3g}", f.closed_error));
         if (c.has_furnace && c.furnace_max > c.limits.furnace)
             add(c, fmt::format("sends out {:.5f} of white light", c.furnace_max));
+        if (c.has_lossless && c.furnace_min < c.limits.lossless)
+            add(c, fmt::format("sends out only {:.5f} of white light, absorbing nothing", c.furnace_min));
         if (f.reciprocity > c.limits.reciprocity) add(c, fmt::format("two directions differ by {:.3g}", f.reciprocity));
         if (f.weight_max > c.limits.weight) add(c, fmt::format("a sample's weight of {:.7g}", f.weight_max));
         if (f.agreement > 1e-4) add(c, fmt::format("sample, value and density differ by {:.3g}", f.agreement));

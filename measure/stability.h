@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -23,12 +24,16 @@
 
 namespace nacre::measure {
 
+struct StabilityReport;
+
 struct StabilityDesc {
     /// Specs of the devices to measure. The first takes all points, the others a tenth.
     std::vector<std::string> backends{"cpu"};
     std::uint64_t points = 100'000'000;  ///< Of all closures together, at least 1,000.
     /// Closures whose name contains this; empty: all. What is measured of them is judged as a part of the whole.
     std::string only;
+    /// Gets what is known after each closure, lobe and tree: a full sweep takes long enough to be broken off.
+    std::function<void(const StabilityReport&)> on_progress = {};
 };
 
 /// How many of a sweep's trees, and samples of each chi-square test, so many points are worth.
@@ -59,10 +64,11 @@ struct StabilityFigures {
     void add(const StabilityFigures& other);
 };
 
-/// What a row promises besides small errors; infinite where it promises nothing.
+/// What a row promises besides small errors; infinite (0 for `lossless`) where it promises nothing.
 struct StabilityLimits {
     static constexpr double none = std::numeric_limits<double>::infinity();
     double furnace = 1.001;      ///< Energy under white light.
+    double lossless = 0.998;     ///< The least of it that what absorbs nothing sends out, where a row has some.
     double reciprocity = none;   ///< Relative defect: of lobes that scatter once.
     double weight = none;        ///< Of a sample: of lobes without compensation.
 };

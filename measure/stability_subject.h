@@ -81,6 +81,7 @@ struct StabilitySubject {
     std::vector<SamplingCase> samplings;  ///< Of slabs.
     /// Smallest and largest energy under white light, where the subject is not a slab; the flag asks for fewer cases.
     std::function<Expected<std::pair<double, double>>(bool is_short)> furnace;
+    bool is_furnace_lossless = false;  ///< All of what `furnace` measures absorbs nothing.
 };
 
 /// The point that a shader reads, a plain struct of 32-bit words, out of and into them.

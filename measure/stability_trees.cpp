@@ -252,6 +252,8 @@ Expected<std::vector<StabilitySubject>> tree_subjects(std::uint32_t count) {
         NACRE_TRY(StabilitySubject subject, tree_subject(name, what, tree, is_lossless));
         if (std::ranges::find(subjects, name, &StabilitySubject::name) == subjects.end() && i > 2)
             subject.furnace = [is_lossless](bool is_short) { return tree_furnace(is_lossless, is_short ? 25 : 500); };
+        subject.is_furnace_lossless = is_lossless;
+        subject.limits.lossless = 0.98;
         subject.share = 0.2;
         subjects.push_back(std::move(subject));
     }

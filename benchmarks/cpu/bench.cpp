@@ -67,7 +67,7 @@ Expected<rhi::Device*> Bench::device(const std::string& spec) {
 }
 
 bool Bench::has_device(const std::string& spec) {
-    if (unavailable_.contains(spec)) return false;
+    if (options_.alone || unavailable_.contains(spec)) return false;
     const auto made = device(spec);
     if (made) return true;
     unavailable_[spec] = made.error().message();
@@ -82,7 +82,9 @@ void Bench::skip(const std::string& name, const std::string& why) {
 }
 
 Expected<void> Bench::measure(Case work) {
-    if (!work.name.starts_with(options_.prefix) || work.cpu.empty() || work.references.empty()) return {};
+    if (options_.alone) work.references.clear();
+    if (!work.name.starts_with(options_.prefix) || work.cpu.empty() || (work.references.empty() && !options_.alone))
+        return {};
     struct Measured {
         Side* side;
         std::vector<double> times, processor_times;
@@ -113,6 +115,14 @@ Expected<void> Bench::measure(Case work) {
     bool any = false;
     for (const Measured& cpu : measured) {
         if (cpu.side->lanes == 0) continue;
+        if (options_.alone) {
+            any = true;
+            fmt::print(
+                "{:<38} {:>2} lanes {:>9.2f} ms, median {:>9.2f} ms, processor time {:>9.2f} ms, median {:>9.2f} ms\n",
+                work.name, cpu.side->lanes, std::ranges::min(cpu.times), measure::median(cpu.times),
+                std::ranges::min(cpu.processor_times), measure::median(cpu.processor_times));
+            continue;
+        }
         for (const Measured& reference : measured) {
             if (reference.side->lanes != 0) continue;
             any = true;

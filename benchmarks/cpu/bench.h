@@ -54,6 +54,7 @@ struct Options {
     std::string prefix;           ///< Only cases that begin so.
     std::uint32_t rounds = 9;
     std::uint32_t lanes = 0;      ///< Only this lane count; 0: all.
+    bool alone = false;           ///< Without references: for profilers, and to hold two builds against each other.
     bool quick = false;           ///< Few rounds, one lane count, few scenes: whether it runs at all.
     std::string assets;           ///< Folder of scenes; may not exist.
 };
@@ -73,11 +74,12 @@ class Bench {
     Expected<rhi::Device*> device(const std::string& spec);
     /// A device of its own.
     Expected<std::unique_ptr<rhi::Device>> new_device(const std::string& spec) const;
-    /// Whether a device can be made; says so once where not.
+    /// Whether the device of a reference is wanted and can be made; says so once where it cannot.
     bool has_device(const std::string& spec);
 
     /// Runs all sides in turn, once uncounted and then for all rounds, and keeps the results. A side that fails is
-    /// reported and left out; an error is returned where no pair is left.
+    /// reported and left out; an error is returned where no pair is left. Where the CPU backend is alone its times are
+    /// printed, and no results kept.
     Expected<void> measure(Case work);
     /// Says why something was not measured, in the output and in the report.
     void skip(const std::string& name, const std::string& why);

@@ -57,7 +57,7 @@ Expected<void> run_scene(Bench& bench, const std::string& name, const std::strin
 Expected<void> run_frame(Bench& bench) {
     // Both are asked, so that both are reported where they are absent.
     const bool has_vulkan = bench.has_device("vulkan"), has_gl = bench.has_device("gl");
-    if (!has_vulkan && !has_gl) return {};
+    if (!has_vulkan && !has_gl && !bench.options().alone) return {};
     std::vector<std::pair<std::string, std::string>> scenes;  // name, what to load
     for (const std::string_view name : scene::builtin_scene_names())
         scenes.emplace_back(name.substr(name.find(':') + 1), name);

@@ -2,7 +2,7 @@
 // Holds the CPU backend against Mesa's software drivers, against code written by hand and against memcpy, on the same
 // SPIR-V through the same interface:
 //
-//     cpu_bench [--case PREFIX] [--rounds N] [--lanes N] [--quick] [--output FOLDER] [--assets FOLDER]
+//     cpu_bench [--case PREFIX] [--rounds N] [--lanes N] [--alone] [--quick] [--output FOLDER] [--assets FOLDER]
 //
 // Prints a table and writes FOLDER/report.json and FOLDER/table.md (out/bench-cpu by default). Ratios are reference
 // over CPU backend: above 1 the CPU backend is faster. Targets that are missed are marked and do not fail the run; a
@@ -44,6 +44,7 @@ int main(int count, char** arguments) {
     app.add_option("--case", options.prefix, "Only the cases whose name begins so");
     auto* rounds = app.add_option("--rounds", options.rounds, "How often each side runs")->check(CLI::Range(1, 1000));
     app.add_option("--lanes", options.lanes, "Only this lane count")->check(CLI::IsMember({4, 8, 16}));
+    app.add_flag("--alone", options.alone, "Without references, for profilers; writes no report");
     app.add_flag("--quick", options.quick, "Few rounds, one lane count, few scenes");
     app.add_option("--output", output, "Folder of report.json");
     app.add_option("--assets", options.assets, "Folder of scenes (NACRE_ASSETS)");
@@ -65,6 +66,7 @@ int main(int count, char** arguments) {
             failed = true;
         }
     }
+    if (options.alone) return failed ? 1 : 0;
     fmt::print("{}", bench.table());
     if (const auto written = bench.write_report(output); !written) {
         fmt::print(stderr, "{}\n", written.error().message());

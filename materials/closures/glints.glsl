@@ -26,20 +26,23 @@ uint glint_cell(float place) { return uint(place - floor(place / 1048576.0) * 10
 float glint_uniform(uint x) { return float(x >> 8u) / 16777216.0; }
 
 // A count whose mean is `mean`: by the inverse of the Poisson distribution where that is small, else by a normal one.
+// Small means are all in the tail, which is counted down from above: a float near 1 would be off by 3e-8, which is all
+// of the probability of a facet where few are seen at slopes far out.
 float glint_count(float mean, uint seed) {
-    float u = glint_uniform(seed);
     if (mean > 20.0) {
-        float radius = sqrt(-2.0 * log(1.0 - u));
+        float radius = sqrt(-2.0 * log(1.0 - glint_uniform(seed)));
         return max(mean + sqrt(mean) * radius * cos(2.0 * pi * glint_uniform(glint_hash(seed))), 0.0);
     }
+    // In the middle of its 2^-32: the mean over all seeds is that of the distribution down to means of 1e-8.
+    float u = (float(seed) + 0.5) / 4294967296.0;
     float probability = exp(-mean);
-    float below = probability;
+    float tail = exponential_rest(mean);  // of more than `count`
     float count = 0.0;
     for (int i = 0; i < 64; ++i) {
-        if (u < below) break;
+        if (u >= tail) break;
         count += 1.0;
         probability *= mean / count;
-        below += probability;
+        tail -= probability;
     }
     return count;
 }

@@ -35,8 +35,9 @@ Lobes::vec2 Library::anisotropy_table(vec4 at) {
         strides[axis] = stride;
         stride *= anisotropy_table_size[axis];
     }
-    const double w = std::clamp(at.w, 0.0, 1.0);
-    const double curve[3] = {(1.0 - w) * (1.0 - 2.0 * w), 4.0 * w * (1.0 - w), w * (2.0 * w - 1.0)};
+    const double w = 3.0 * std::clamp(at.w, 0.0, 1.0);
+    const double curve[4] = {(1.0 - w) * (2.0 - w) * (3.0 - w) / 6.0, 0.5 * w * (2.0 - w) * (3.0 - w),
+                             0.5 * w * (w - 1.0) * (3.0 - w), w * (w - 1.0) * (w - 2.0) / 6.0};
     vec2 sum(0.0);
     for (int corner = 0; corner < 8; ++corner) {
         double weight = 1.0;

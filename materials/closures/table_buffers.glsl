@@ -44,21 +44,23 @@ vec2 medium_table(vec3 at) {
 #ifdef NACRE_SLAB_ANISOTROPY
 vec2 anisotropy_table(vec4 at) {
     vec4 place = clamp(at, vec4(0.0), vec4(1.0));
-    vec3 scaled = vec3(place.x, place.y, place.z) * vec3(19.0, 17.0, 14.0);
-    ivec3 entry = min(ivec3(scaled), ivec3(18, 16, 13));
+    vec3 scaled = vec3(place.x, place.y, place.z) * vec3(17.0, 14.0, 14.0);
+    ivec3 entry = min(ivec3(scaled), ivec3(16, 13, 13));
     vec3 part = scaled - vec3(entry);
-    vec3 curve = vec3((1.0 - place.w) * (1.0 - 2.0 * place.w), 4.0 * place.w * (1.0 - place.w),
-                      place.w * (2.0 * place.w - 1.0));
+    float w = 3.0 * place.w;
+    vec4 curve = vec4((1.0 - w) * (2.0 - w) * (3.0 - w) / 6.0, 0.5 * w * (2.0 - w) * (3.0 - w),
+                      0.5 * w * (w - 1.0) * (3.0 - w), w * (w - 1.0) * (w - 2.0) / 6.0);
     vec2 sum = vec2(0.0);
     for (int corner = 0; corner < 8; ++corner) {
         ivec3 offset = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
         vec3 weight = mix(vec3(1.0) - part, part, vec3(offset));
         ivec3 index = entry + offset;
-        int word = (index.z * 18 + index.y) * 20 + index.x;
+        int word = (index.z * 15 + index.y) * 18 + index.x;
         sum += weight.x * weight.y * weight.z *
                (curve.x * unpackUnorm2x16(anisotropy_word(word)) +
-                curve.y * unpackUnorm2x16(anisotropy_word(word + 5400)) +
-                curve.z * unpackUnorm2x16(anisotropy_word(word + 10800)));
+                curve.y * unpackUnorm2x16(anisotropy_word(word + 4050)) +
+                curve.z * unpackUnorm2x16(anisotropy_word(word + 8100)) +
+                curve.w * unpackUnorm2x16(anisotropy_word(word + 12150)));
     }
     return sum;
 }

@@ -7,7 +7,7 @@ namespace {
 constexpr std::uint16_t anisotropy_words[] = {
 #include "materials/tables/anisotropy_table_data.inc"
 };
-static_assert(sizeof(anisotropy_words) == 2 * 2 * 20 * 18 * 15 * 3);
+static_assert(sizeof(anisotropy_words) == 2 * 2 * 18 * 15 * 15 * 4);
 
 }  // namespace
 

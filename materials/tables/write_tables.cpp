@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <string_view>
+#include <vector>
 
 #include "materials/tables/anisotropy_table_generator.h"
 #include "materials/tables/interface_table_generator.h"
@@ -46,13 +47,20 @@ void write_medium_table() {
 
 void write_anisotropy_table() {
     using namespace nacre::materials;
-    WordWriter words;
     const auto& size = anisotropy_table_size;
-    for (std::uint32_t i = 0; i < size[0] * size[1] * size[2] * size[3]; ++i) {
+    const auto number_of = [&](const AnisotropyIndex& at) {
+        return at[0] + size[0] * (at[1] + size[1] * (at[2] + size[2] * at[3]));
+    };
+    const auto index_of = [&](std::uint32_t i) {
         const std::uint32_t above = i / size[0], higher = above / size[1];
-        for (const double value :
-             anisotropy_table_entry({i % size[0], above % size[1], higher % size[2], higher / size[2]}, 96))
-            words.write(value);
+        return AnisotropyIndex{i % size[0], above % size[1], higher % size[2], higher / size[2]};
+    };
+    std::vector<std::array<double, 2>> samples(std::size_t{size[0]} * size[1] * size[2] * size[3]);
+    for (std::uint32_t i = 0; i < samples.size(); ++i) samples[i] = anisotropy_table_sample(index_of(i), 96);
+    WordWriter words;
+    for (std::uint32_t i = 0; i < samples.size(); ++i) {
+        const auto sample = [&](const AnisotropyIndex& at) { return samples[number_of(at)]; };
+        for (const double value : anisotropy_table_entry(index_of(i), sample)) words.write(value);
     }
     std::puts("");
 }

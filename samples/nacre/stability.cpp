@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <tuple>
 
 #include "core/file.h"
 #include "samples/nacre/backends.h"
@@ -33,6 +34,13 @@ Outcome run(const StabilityArguments& arguments) {
             const std::vector<std::string> working = working_backends(*instance);
             if (std::ranges::find(working, name) != working.end()) desc.backends.emplace_back(name);
         }
+    }
+    if (!arguments.output.empty()) {
+        // What is known so far; whether it can be written is said at the end.
+        desc.on_progress = [&](const measure::StabilityReport& report) {
+            std::ignore = write_file_atomically(std::filesystem::path(arguments.output) / "report.json",
+                                                measure::to_json(report));
+        };
     }
     auto measured = measure::measure_stability(*instance, desc);
     if (!measured) {

@@ -30,9 +30,7 @@ double smallest_probability(Library& library, const Library::Closure& closure, d
     const glm::dvec3 view = closure.view;
     measure::ChiSquareTest test({.rings = is_full_test() ? 80 : 40,
                                  .axis = {-view.x, -view.y, view.z},
-                                 .smallest_angle = std::clamp(narrowest, 1e-5, 1.0),
-                                 .tolerance = is_full_test() ? 2e-5 : 1e-3,
-                                 .subdivisions = is_full_test() ? 13 : 10},
+                                 .smallest_angle = std::clamp(narrowest, 1e-5, 1.0)},
                                 [&](const glm::dvec3& w) { return library.closure_pdf(closure, w); });
     Random random(seed);
     for (long i = 0; i < samples; ++i) {

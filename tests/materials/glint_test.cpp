@@ -25,6 +25,51 @@ Moments over_the_surface(Library& library, const glm::dvec3& h, double density, 
     return {mean, std::sqrt(std::max(squares / samples - mean * mean, 0.0))};
 }
 
+// Expectation of a count over all 2^32 seeds, of which those with many facets come first.
+double expectation(Library& library, double mean) {
+    double sum = 0.0;
+    for (int count = 1; count <= 64; ++count) {
+        std::uint64_t low = 0, high = std::uint64_t{1} << 32;
+        while (low < high) {
+            const std::uint64_t middle = (low + high) / 2;
+            if (library.glint_count(mean, static_cast<std::uint32_t>(middle)) >= count) low = middle + 1;
+            else high = middle;
+        }
+        sum += static_cast<double>(low) * 0x1p-32;
+    }
+    return sum;
+}
+
+// What is seen of a place is a mean of counts with weights whose sum is 1: with seeds as good as random, the mean over
+// places is off by as much as this one. Where a pixel has few facets and slopes lie far out, counts have means like these.
+TEST(Glints, CountsHaveTheirMean) {
+    Library library;
+    for (const double mean : {1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 5.0, 19.9})
+        EXPECT_NEAR(expectation(library, mean) / mean, 1.0, 1e-6 + 0x1p-32 / mean) << mean;
+}
+
+// Below 9 facets in a footprint as well; counts of cells repeat after a million of them, not before.
+TEST(Glints, TheMeanOverFewFacetsIsTheLobe) {
+    Library library;
+    const double footprint = 0.3;
+    for (const double facets : {1e-3, 0.1, 3.0}) {
+        const double density = facets / (footprint * footprint), size = std::max(footprint, 1.0 / std::sqrt(density));
+        Random random(17);
+        double sum = 0.0, squares = 0.0;
+        const int places = 600000;
+        for (int i = 0; i < places; ++i) {
+            const glm::dvec2 position(random(0.0, 1e6) * size, random(0.0, 1e6) * size);
+            const double factor = library.glint_factor(direction(0.99, 0.4), {0.2, 0.2}, density, position,
+                                                       {footprint, 0.0}, {0.0, footprint});
+            sum += factor;
+            squares += factor * factor;
+        }
+        const double mean = sum / places, error = std::sqrt((squares / places - mean * mean) / places);
+        EXPECT_NEAR(mean, 1.0, 4.0 * error) << facets;
+        EXPECT_LT(4.0 * error, 0.05) << facets;
+    }
+}
+
 TEST(Glints, TheMeanOverTheSurfaceIsTheLobeAtEveryDensity) {
     Library library;
     for (const glm::dvec3 h : {direction(1.0, 0.0), direction(0.98, 0.4), direction(0.9, 2.0)}) {

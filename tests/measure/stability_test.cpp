@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include "measure/chi_square.h"
@@ -43,6 +44,8 @@ TEST(Stability, ClosuresKeepTheirPromises) {
             EXPECT_LE(c.all.weight_max, 1.0 + 1e-5);
         }
         if (c.name == "trees-lossless") {
+            EXPECT_TRUE(c.has_lossless);
+            EXPECT_EQ(c.limits.lossless, 0.98);
             EXPECT_GE(c.furnace_min, 0.98);
         }
     }
@@ -70,15 +73,16 @@ TEST(Stability, WhatIsBrokenIsNamed) {
     bad.all.agreement = 1e-3;
     bad.chi2_tests = 2;
     bad.chi2_failures = 1;
-    bad.has_furnace = true;
+    bad.has_furnace = bad.has_lossless = true;
     bad.furnace_max = 1.002;
+    bad.furnace_min = 0.99;
     bad.limits = {.reciprocity = 1e-4, .weight = 1.0};
     bad.all.reciprocity = 2e-4;
     bad.all.weight_max = 1.5;
     report.closures.push_back(bad);
     EXPECT_THAT(violations_of(report),
                 ElementsAre(HasSubstr("3 results are not a number"), HasSubstr("error of 0.1"),
-                            HasSubstr("sends out 1.00200"), HasSubstr("differ by 0.0002"),
+                            HasSubstr("sends out 1.00200"), HasSubstr("only 0.99000"), HasSubstr("differ by 0.0002"),
                             HasSubstr("weight of 1.5"), HasSubstr("0.001"), HasSubstr("1 of 2 samplers")));
     // JSON knows no infinity.
     report.closures[1].all.max_rel_error = INFINITY;
@@ -158,7 +162,7 @@ TEST(Stability, TooFewPointsAndUnknownNamesAreErrors) {
 // Samples of a cosine lobe pass against its own density, and not against one that is wrong by 1 %, nor against another.
 TEST(ChiSquareTest, TellsOnePercent) {
     const auto cosine = [](const glm::dvec3& w) { return std::max(w.z, 0.0) / std::numbers::pi; };
-    const DirectionBins bins{.rings = 40, .smallest_angle = 0.5, .tolerance = 1e-4, .subdivisions = 10};
+    const DirectionBins bins{.rings = 40, .smallest_angle = 0.5};
     ChiSquareTest test(bins, cosine);
     ChiSquareTest other(bins, [](const glm::dvec3& w) { return w.z > 0.0 ? 0.5 / std::numbers::pi : 0.0; });
     Random random(3);
@@ -171,6 +175,65 @@ TEST(ChiSquareTest, TellsOnePercent) {
     EXPECT_LT(test.smallest_probability(1.01), 1e-9);
     EXPECT_LT(test.smallest_probability(0.99), 1e-9);
     EXPECT_LT(other.smallest_probability(), 1e-9);
+}
+
+// Bins around an axis that lies low are cut by the surface, where a density ends: their integrals are those of fine sums,
+// to a part of what their counts vary by.
+TEST(ChiSquareTest, BinsEndAtTheSurface) {
+    const auto density = [](const glm::dvec3& w) { return w.z > 0.0 ? 0.5 / std::numbers::pi : 0.0; };
+    const DirectionBins bins{.rings = 16, .axis = {std::sqrt(1.0 - 0.09), 0.0, 0.3}, .smallest_angle = 0.5};
+    ChiSquareTest test(bins, density);
+    Random random(4);
+    const int samples = 1'000'000;
+    for (int i = 0; i < samples; ++i) test.add(direction(random(), 2.0 * std::numbers::pi * random()));
+    EXPECT_GT(test.smallest_probability(), 1e-3);
+    EXPECT_LT(test.smallest_probability(1.01), 1e-9);
+    double sum = 0.0;
+    for (const double share : test.expected()) sum += share;
+    EXPECT_NEAR(sum, 1.0, 1e-6);
+    // Each ring of a hemisphere of constant density is cut by the surface over a part of its circle: by rings of angles.
+    const double growth = std::log1p(1.0 / bins.smallest_angle) / bins.rings;
+    for (int ring = 0; ring < bins.rings; ++ring) {
+        const double low = std::numbers::pi * bins.smallest_angle * std::expm1(growth * ring),
+                     high = std::numbers::pi * bins.smallest_angle * std::expm1(growth * (ring + 1));
+        double exact = 0.0;
+        const int steps = 20000;
+        for (int i = 0; i < steps; ++i) {
+            const double angle = low + (high - low) * (i + 0.5) / steps;
+            // Above the surface where cos(phi) tilt sin(angle) > -axis.z cos(angle).
+            const double edge = -0.3 * std::cos(angle) / (std::sqrt(1.0 - 0.09) * std::sin(angle));
+            exact += std::acos(std::clamp(edge, -1.0, 1.0)) / std::numbers::pi * std::sin(angle) * (high - low) / steps;
+        }
+        double found = 0.0;
+        for (int sector = 0; sector < 2 * bins.rings; ++sector) found += test.expected()[ring * 2 * bins.rings + sector];
+        EXPECT_NEAR(found, exact, 1e-6) << ring;
+    }
+}
+
+// What is much narrower than a bin, and lies where no node is, is found by the counts.
+TEST(ChiSquareTest, SeesPeaksThatNoNodeMeets) {
+    const glm::dvec3 peak = direction(0.7, 1.0), right = glm::normalize(glm::cross(peak, glm::dvec3(0.0, 0.0, 1.0))),
+                     up = glm::cross(peak, right);
+    const double sharpness = 1e7;
+    const auto density = [&](const glm::dvec3& w) {
+        const double distance = glm::length(w - peak);
+        return 0.5 * std::max(w.z, 0.0) / std::numbers::pi +
+               0.5 * sharpness / (2.0 * std::numbers::pi) * std::exp(-0.5 * sharpness * distance * distance);
+    };
+    ChiSquareTest test({.rings = 40, .smallest_angle = 0.5}, density);
+    Random random(5);
+    for (int i = 0; i < 1'000'000; ++i) {
+        if (random() < 0.5) {
+            test.add(direction(std::sqrt(random()), 2.0 * std::numbers::pi * random()));
+        } else {
+            // 1 - cos is distributed exponentially.
+            const double cosine = 1.0 + std::log(1.0 - random()) / sharpness, phi = 2.0 * std::numbers::pi * random();
+            const double sine = std::sqrt(1.0 - cosine * cosine);
+            test.add(cosine * peak + sine * (std::cos(phi) * right + std::sin(phi) * up));
+        }
+    }
+    EXPECT_GT(test.smallest_probability(), 1e-3);
+    EXPECT_LT(test.smallest_probability(1.01), 1e-9);
 }
 
 }  // namespace

@@ -85,7 +85,8 @@ class OrcGenerator final : public CodeGenerator {
             if (!features.empty()) features += ',';
             features += (feature.getValue() ? "+" : "-") + feature.getKey().str();
             if (feature.getKey() == "f16c" && feature.getValue()) math_options_.half_instructions = true;
-            if (feature.getKey() == "avx512vl" && feature.getValue()) math_options_.exponent_instructions = contract;
+            if (feature.getKey() == "avx512vl" && feature.getValue())
+                math_options_.exponent_instructions = contract, math_options_.conversion_instructions = true;
         }
         cpu_ = llvm::sys::getHostCPUName().str();
         features_ = features;

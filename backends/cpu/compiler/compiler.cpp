@@ -5,7 +5,9 @@
 #include <llvm/IR/LLVMContext.h>
 #include <llvm/IR/Verifier.h>
 #include <llvm/Support/raw_ostream.h>
+#include <spirv-tools/libspirv.h>
 
+#include <bit>
 #include <cstdlib>
 #include <cstring>
 #include <map>
@@ -15,6 +17,7 @@
 #include "backends/cpu/compiler/legalization.h"
 #include "backends/cpu/compiler/module.h"
 #include "backends/cpu/compiler/stages.h"
+#include "backends/cpu/compiler/stored_code.h"
 #include "compiler_sources_hash.h"
 #include "core/disk_cache.h"
 #include "rhi/spirv.h"
@@ -51,8 +54,7 @@ class ShaderCompilation final : public Compiler {
     Expected<VertexProgram> compile_vertex(const ShaderSource& source, const VertexInput& input) override {
         VertexProgram program;
         std::shared_ptr<CompiledCode> code;
-        std::vector<NarrowedOperation> narrowed;
-        NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Vertex, input, narrowed,
+        NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Vertex, input, program,
                                 [&](llvm::Module& target, const Module& module) {
                                     VertexEmitter emitter(target, module, all_.options,
                                                           all_.generator->math_options(), source.slots, input);
@@ -60,14 +62,13 @@ class ShaderCompilation final : public Compiler {
                                     program = emitter.program;
                                     return Emitted{false, emitter.narrowed()};
                                 }));
-        return with_entry(std::move(program), std::move(code), std::move(narrowed), source);
+        return with_entry(std::move(program), std::move(code), source);
     }
 
     Expected<FragmentProgram> compile_fragment(const ShaderSource& source) override {
         FragmentProgram program;
         std::shared_ptr<CompiledCode> code;
-        std::vector<NarrowedOperation> narrowed;
-        NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Fragment, {}, narrowed,
+        NACRE_TRY(code, compile(all_, source, spv::ExecutionModel::Fragment, {}, program,
                                 [&](llvm::Module& target, const Module& module) {
                                     FragmentEmitter emitter(target, module, all_.options,
                                                             all_.generator->math_options(), source.slots);
@@ -76,7 +77,7 @@ class ShaderCompilation final : public Compiler {
                                     program = emitter.program;
                                     return Emitted{false, emitter.narrowed()};
                                 }));
-        return with_entry(std::move(program), std::move(code), std::move(narrowed), source);
+        return with_entry(std::move(program), std::move(code), source);
     }
 
   private:
@@ -89,44 +90,41 @@ class ShaderCompilation final : public Compiler {
                                              std::uint64_t& stack_bytes) {
         ComputeProgram program;
         program.name = std::string(source.name);
-        std::uint64_t workgroup_bytes = 0;
-        std::uint32_t subgroups = 1;
-        bool has_barriers = false;
-        std::vector<NarrowedOperation> narrowed;
-        NACRE_TRY(program.code, compile(how, source, spv::ExecutionModel::GLCompute, {}, narrowed,
+        ComputeFacts facts;
+        NACRE_TRY(program.code, compile(how, source, spv::ExecutionModel::GLCompute, {}, facts,
                                         [&](llvm::Module& target, const Module& module) {
                                             ComputeEmitter emitter(target, module, how.options,
                                                                    how.generator->math_options(), source.slots);
                                             emitter.trace_table = source.trace;
                                             emitter.emit();
-                                            program.workgroup_size = module.workgroup_size;
-                                            workgroup_bytes = emitter.workgroup_bytes, subgroups = emitter.subgroups;
-                                            has_barriers = emitter.has_barriers;
-                                            return Emitted{has_barriers, emitter.narrowed()};
+                                            facts.workgroup_size = module.workgroup_size;
+                                            facts.workgroup_bytes = emitter.workgroup_bytes;
+                                            facts.subgroups = emitter.subgroups;
+                                            facts.has_barriers = emitter.has_barriers;
+                                            return Emitted{emitter.has_barriers, emitter.narrowed()};
                                         },
                                         &stack_bytes));
-        program.narrowed = std::move(narrowed);
+        program.workgroup_size = facts.workgroup_size;
+        program.narrowed = std::move(facts.narrowed);
         if (!program.code) return program;
         auto& code = static_cast<LoadedCode&>(*program.code);
         program.run = reinterpret_cast<ComputeFunction>(code.find("kernel"));
         if (!program.run) return missing(source);
-        program.workgroup_bytes = (workgroup_bytes + 63) / 64 * 64;
-        if (has_barriers) {
+        program.workgroup_bytes = (facts.workgroup_bytes + 63) / 64 * 64;
+        if (facts.has_barriers) {
             const auto frame_size = reinterpret_cast<void (*)(std::uint64_t*)>(code.find("frame_size"));
             if (!frame_size) return missing(source);
             std::uint64_t bytes = 0;
             frame_size(&bytes);
-            program.workgroup_bytes += (bytes + 63) / 64 * 64 * subgroups;
+            program.workgroup_bytes += (bytes + 63) / 64 * 64 * facts.subgroups;
         }
         return program;
     }
 
     /// A program of one stage of drawing with what `compile` gave for it.
     template <typename Program>
-    Expected<Program> with_entry(Program program, std::shared_ptr<CompiledCode> code,
-                                 std::vector<NarrowedOperation> narrowed, const ShaderSource& source) const {
+    Expected<Program> with_entry(Program program, std::shared_ptr<CompiledCode> code, const ShaderSource& source) const {
         program.in_double = all_.options.mode == ExecutionMode::double_precision;
-        program.narrowed = std::move(narrowed);
         program.name = std::string(source.name);
         if (!code) return program;
         program.run = reinterpret_cast<decltype(program.run)>(static_cast<LoadedCode&>(*code).find("kernel"));
@@ -156,12 +154,45 @@ class ShaderCompilation final : public Compiler {
         std::map<std::uint32_t, std::string> narrowed;
     };
 
-    /// Runs `emit`, which gives an Emitted, on a new LLVM module and makes code of it; null where that is not wanted.
+    /// The code of a shader, from the disk cache or made anew; null where none is wanted.
+    /// @param facts  gets what is known of it (stored_code.h), from the cache or from `translate`
+    /// @param emit   fills an LLVM module and all of `facts` but `narrowed`; gives an Emitted
     /// @param too_large_stack  gets the bytes of stack that the code takes where that is too much
-    template <typename Emit>
-    Expected<std::shared_ptr<CompiledCode>> compile(const Variant& how, const ShaderSource& source, spv::ExecutionModel model,
-                                                    const VertexInput& input, std::vector<NarrowedOperation>& narrowed,
+    template <typename Facts, typename Emit>
+    Expected<std::shared_ptr<CompiledCode>> compile(const Variant& how, const ShaderSource& source,
+                                                    spv::ExecutionModel model, const VertexInput& input, Facts& facts,
                                                     Emit&& emit, std::uint64_t* too_large_stack = nullptr) {
+        // Code that is traced refers to addresses of this process; only what is translated can be written out.
+        const bool is_kept = how.options.use_disk_cache && !source.trace && !how.options.only_translates && cache_.is_on();
+        const Hash128 key = is_kept ? key_of(how, source, model, input) : Hash128{};
+        StoredCode code;
+        const auto is_known = [&] {
+            if (!is_kept || std::getenv("NACRE_CPU_DUMP")) return false;
+            const auto entry = cache_.load("cpu", key);
+            return entry && from_entry(*entry, facts, code);
+        };
+        if (!is_known()) {
+            NACRE_TRY(code, translate(how, source, model, facts, emit));
+            if (how.options.only_translates) return nullptr;
+            if (is_kept) cache_.store("cpu", key, to_entry(facts, code));
+        }
+        if (code.stack_bytes > most_stack_bytes) {
+            if (too_large_stack) *too_large_stack = code.stack_bytes;
+            return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", source.name),
+                        fmt::format("its values take {} bytes of stack with {} lanes; {} are the most", code.stack_bytes,
+                                    how.options.lanes, most_stack_bytes),
+                        fmt::format("Load parts of arrays and structures instead of whole ones{}.",
+                                    how.options.lanes > min_lanes ? ", or choose fewer lanes (as in 'cpu:lanes=4')" : ""));
+        }
+        NACRE_TRY(std::shared_ptr<LoadedCode> loaded,
+                  how.generator->load(std::move(code.object), std::string(source.name)));
+        return std::shared_ptr<CompiledCode>(std::move(loaded));
+    }
+
+    /// The way from SPIR-V to an object file; to nothing where only translation is wanted. As for `compile`.
+    template <typename Facts, typename Emit>
+    Expected<StoredCode> translate(const Variant& how, const ShaderSource& source, spv::ExecutionModel model,
+                                   Facts& facts, Emit& emit) {
         NACRE_TRY(const std::vector<std::uint32_t> words, legalize(source.spirv, source.specialization, source.name,
                                                                     {.keeps_variables = (how.options.checks & check_sanitize) != 0,
                                                                      .inlines_all = how.options.checks != 0 || source.trace}));
@@ -182,7 +213,7 @@ class ShaderCompilation final : public Compiler {
                         "the module refers to something in a way that the CPU backend does not know", "Use another backend.");
         }
         for (const auto& [offset, operation] : emitted.narrowed)
-            narrowed.push_back({rhi::spirv::source_line(words, offset), operation});
+            facts.narrowed.push_back({rhi::spirv::source_line(words, offset), operation});
         if (const char* dump = std::getenv("NACRE_CPU_DUMP")) {
             std::error_code problem;
             std::string file(source.name);
@@ -200,42 +231,38 @@ class ShaderCompilation final : public Compiler {
             if (llvm::verifyModule(*target))
                 return fail(ErrorCode::internal, "compile shader", fmt::format("'{}'", source.name), "its LLVM module is not valid",
                             "Use another backend.");
-            return nullptr;
+            return StoredCode{};
         }
-        // Code that is traced refers to addresses of this process.
-        const bool use_disk_cache = how.options.use_disk_cache && !source.trace;
-        const Hash128 key = key_of(how, words, source, model, input);
-        std::vector<std::byte> object;
-        if (use_disk_cache)
-            if (auto found = cache_.load("cpu", key)) object = std::move(*found);
-        if (object.empty()) {
-            NACRE_TRY(CodeGenerator::Object made,
-                      how.generator->compile(*target, std::string(source.name), emitted.has_coroutines));
-            if (made.stack_bytes > most_stack_bytes) {
-                if (too_large_stack) *too_large_stack = made.stack_bytes;
-                return fail(
-                    ErrorCode::unsupported, "compile shader", fmt::format("'{}'", source.name),
-                    fmt::format("its values take {} bytes of stack with {} lanes; {} are the most", made.stack_bytes,
-                                how.options.lanes, most_stack_bytes),
-                    fmt::format("Load parts of arrays and structures instead of whole ones{}.",
-                                how.options.lanes > min_lanes ? ", or choose fewer lanes (as in 'cpu:lanes=4')" : ""));
-            }
-            object = std::move(made.bytes);
-            if (use_disk_cache) cache_.store("cpu", key, object);
-        }
-        NACRE_TRY(std::shared_ptr<LoadedCode> code, how.generator->load(std::move(object), std::string(source.name)));
-        return std::shared_ptr<CompiledCode>(std::move(code));
+        NACRE_TRY(CodeGenerator::Object made,
+                  how.generator->compile(*target, std::string(source.name), emitted.has_coroutines));
+        // What cannot run need not be kept; that it cannot is.
+        if (made.stack_bytes > most_stack_bytes) made.bytes.clear();
+        return StoredCode{made.stack_bytes, std::move(made.bytes)};
     }
 
-    Hash128 key_of(const Variant& how, std::span<const std::uint32_t> words, const ShaderSource& source, spv::ExecutionModel model,
-                   const VertexInput& input) const {
-        std::string text = fmt::format("{} {} {} {} {} {} {} {}\n", nacre_cpu_compiler_sources, how.options.lanes, static_cast<int>(how.options.mode),
-                                       how.options.checks, static_cast<int>(model), source.entry_point, how.generator->fingerprint(), words.size());
+    /// Of all that the code depends on. The module is that which came in: what legalization makes of it depends on the
+    /// module, the constants, the options and SPIRV-Tools.
+    static Hash128 key_of(const Variant& how, const ShaderSource& source, spv::ExecutionModel model,
+                          const VertexInput& input) {
+        std::string text = fmt::format("{} {} {} {} {} {} {} {} {}\n", nacre_cpu_compiler_sources, how.options.lanes,
+                                       static_cast<int>(how.options.mode), how.options.checks, static_cast<int>(model),
+                                       source.entry_point, how.generator->fingerprint(), spvSoftwareVersionDetailsString(),
+                                       source.spirv.size());
+        for (const rhi::SpecializationConstant& constant : source.specialization)
+            text += std::visit(
+                [&](auto value) {
+                    const auto bits = [&] {
+                        if constexpr (std::is_same_v<decltype(value), bool>) return std::uint32_t{value};
+                        else return std::bit_cast<std::uint32_t>(value);
+                    }();
+                    return fmt::format("c{} {}\n", constant.id, bits);
+                },
+                constant.value);
         for (const BindingSlots& slot : source.slots) text += fmt::format("s{} {} {} {}\n", slot.set, slot.binding, slot.first, slot.count);
         for (const rhi::VertexAttribute& at : input.attributes)
             text += fmt::format("a{} {} {} {}\n", at.location, at.buffer, at.offset, static_cast<int>(at.format));
         for (const rhi::VertexBufferLayout& at : input.buffers) text += fmt::format("b{} {}\n", at.stride, at.per_instance);
-        text.append(reinterpret_cast<const char*>(words.data()), words.size() * 4);
+        text.append(reinterpret_cast<const char*>(source.spirv.data()), source.spirv.size() * 4);
         return hash128(std::as_bytes(std::span(text)));
     }
 

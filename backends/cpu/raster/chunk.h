@@ -88,6 +88,7 @@ struct ChunkScratch {
     std::vector<std::uint32_t> indices;  ///< Of each different vertex of the segment.
     std::vector<std::uint32_t> locals;   ///< For each element of the segment its place in `indices`.
     std::vector<std::uint32_t> list;     ///< Those of a strip, as a list of triangles.
+    std::vector<std::uint32_t> places;   ///< Into `indices`, for each index from the lowest on.
     std::vector<CacheEntry> cache;
     std::uint32_t generation = 0;
     std::vector<VertexBatch> batches;

@@ -56,7 +56,7 @@ struct Rasterizer::State {
     std::vector<ChunkView> views;
     std::vector<const DrawPlan*> plans;
     std::vector<std::uint32_t> busy_tiles;
-    std::vector<std::uint8_t> tile_marks;
+    std::vector<std::uint64_t> tile_chunks;  ///< TileJob::tile_chunks
     std::vector<std::uint8_t> uncleared;  ///< For each tile: whether what is to be cleared there still is to be.
 
     State(Scheduler& of_scheduler, std::uint32_t lane_count, const RasterizerOptions& of_options)
@@ -147,23 +147,30 @@ struct Rasterizer::State {
             build_chunk(*chunks[index], draws, targets, kernels, lanes, scratch[thread]);
         });
         const std::uint32_t tile_count = targets.tiles_x * targets.tiles_y;
-        tile_marks.assign(tile_count, 0);
+        const std::uint32_t chunk_words = (chunk_count + 63) / 64;
+        tile_chunks.assign(std::size_t{tile_count} * chunk_words, 0);
         views.clear();
-        bool all_tiles = false;
         for (std::uint32_t i = 0; i < chunk_count; ++i) {
             const Chunk& chunk = *chunks[i];
             if (chunk.records.empty()) continue;
+            std::uint64_t* const words = tile_chunks.data() + views.size() / 64;
+            const std::uint32_t bit = views.size() % 64;
             views.push_back({chunk.records.data(), chunk.vertices.data(),
                              chunk.bin_offsets.empty() ? nullptr : chunk.bin_offsets.data(), chunk.bins.data(),
                              chunk.large.data(), static_cast<std::uint32_t>(chunk.large.size())});
-            all_tiles = all_tiles || !chunk.large.empty();
-            if (!chunk.bin_offsets.empty())
-                for (std::uint32_t tile = 0; tile < tile_count; ++tile)
-                    tile_marks[tile] |= chunk.bin_offsets[tile] != chunk.bin_offsets[tile + 1];
+            const std::uint32_t* const offsets = views.back().bin_offsets;
+            for (std::uint32_t tile = 0; tile < tile_count; ++tile) {
+                const bool has_any = !chunk.large.empty() || (offsets && offsets[tile] != offsets[tile + 1]);
+                words[std::size_t{tile} * chunk_words] |= std::uint64_t{has_any} << bit;
+            }
         }
         busy_tiles.clear();
-        for (std::uint32_t tile = 0; tile < tile_count; ++tile)
-            if (all_tiles || tile_marks[tile] || (clears && uncleared[tile])) busy_tiles.push_back(tile);
+        for (std::uint32_t tile = 0; tile < tile_count; ++tile) {
+            const std::uint64_t* const words = tile_chunks.data() + std::size_t{tile} * chunk_words;
+            if (std::any_of(words, words + chunk_words, [](std::uint64_t word) { return word != 0; }) ||
+                (clears && uncleared[tile]))
+                busy_tiles.push_back(tile);
+        }
         if (options.tile_order) std::ranges::shuffle(busy_tiles, std::minstd_rand(*options.tile_order + 1));
 
         std::size_t primitive_bytes = sizeof(PrimitiveData);
@@ -184,9 +191,8 @@ struct Rasterizer::State {
             if (double_memory[thread].reserve(bytes, 0)) std::memset(double_memory[thread].data(), 0, bytes);
             workspace(thread).doubles = reinterpret_cast<FragmentDoubles*>(double_memory[thread].data());
         }
-        const TileJob job{&targets,        views.data(), static_cast<std::uint32_t>(views.size()),
-                          plans.data(),    lanes,        &srgb_tables(),
-                          uncleared.data()};
+        const TileJob job{&targets,       views.data(),     plans.data(),       lanes,
+                          &srgb_tables(), uncleared.data(), tile_chunks.data(), chunk_words};
         run(static_cast<std::uint32_t>(busy_tiles.size()), [&](std::uint32_t index, std::uint32_t thread) {
             kernels.draw_tile(job, busy_tiles[index], workspace(thread));
         });

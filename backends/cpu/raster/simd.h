@@ -300,6 +300,19 @@ NACRE_LANES_INLINE Floats absolute(const Floats& a) { return floats_of_bits(bits
 
 #undef NACRE_EACH
 
+/// A number as a type: `at` is a constant where it is used.
+template <int number>
+struct Index {
+    static constexpr int at = number;
+};
+/// Calls `work` with Index<0>, Index<1>, ... one after the other: a loop that is unrolled for certain, so that arrays
+/// over its index stay in registers.
+template <int count, typename Work>
+NACRE_LANES_INLINE void unrolled(const Work& work) {
+    if constexpr (count > 1) unrolled<count - 1>(work);
+    if constexpr (count > 0) work(Index<count - 1>{});
+}
+
 /// Four floats or integers, as the rows of a vertex or plane, or the pixels of a quad.
 using Float4 [[gnu::vector_size(16)]] = float;
 using Int4 [[gnu::vector_size(16)]] = std::int32_t;
@@ -358,6 +371,104 @@ NACRE_LANES_INLINE void transpose(Row& a, Row& b, Row& c, Row& d) {
     b = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
     c = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
     d = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
+}
+
+/// The sixteen groups of four bits of a number, the lowest first.
+NACRE_LANES_INLINE Ints groups_of_four_bits(std::uint64_t bits) {
+    Ints result;
+#if defined(__AVX512F__)
+    const __m512i words =
+        _mm512_mask_set1_epi32(_mm512_set1_epi32(static_cast<int>(bits)), 0xff00, static_cast<int>(bits >> 32));
+    const __m512i shifts = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28);
+    result.part[0] = (IntRegister)_mm512_and_epi32(_mm512_srlv_epi32(words, shifts), _mm512_set1_epi32(15));
+#else
+    alignas(64) constexpr std::int32_t shifts[8] = {0, 4, 8, 12, 16, 20, 24, 28};
+    UintRegister shift;
+    std::memcpy(&shift, shifts, sizeof(shift));
+    for (int i = 0; i < registers; ++i) {
+        const auto word = static_cast<std::uint32_t>(bits >> (4 * register_lanes * i));
+        result.part[i] = (IntRegister)(((UintRegister{} + word) >> shift) & 15);
+    }
+#endif
+    return result;
+}
+
+#if !defined(__AVX512F__)
+/// The numbers of the lanes in a set of four, and behind them whatever.
+alignas(16) constexpr std::int32_t lane_order[16][4] = {
+    {0, 0, 0, 0}, {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {2, 0, 0, 0}, {0, 2, 0, 0}, {1, 2, 0, 0}, {0, 1, 2, 0},
+    {3, 0, 0, 0}, {0, 3, 0, 0}, {1, 3, 0, 0}, {0, 1, 3, 0}, {2, 3, 0, 0}, {0, 2, 3, 0}, {1, 2, 3, 0}, {0, 1, 2, 3}};
+#endif
+/// Writes the lanes whose bit is set, one behind the other, and whatever up to sixteen words behind `to`.
+NACRE_LANES_INLINE void store_packed(std::uint32_t* to, std::uint32_t mask, const Ints& values) {
+#if defined(__AVX512F__)
+    _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), (__m512i)values.part[0]));
+#else
+    alignas(64) std::int32_t lanes[16];
+    store(lanes, values);
+    for (int lane = 0; lane < 16; lane += 4) {
+        const std::uint32_t four = mask >> lane & 15;
+        store4(to, shuffled(load4(lanes + lane), load4(lane_order[four])));
+        to += __builtin_popcount(four);
+    }
+#endif
+}
+
+/// Sixteen rows of four words, each from an address of its own, word by word: word w of row i is lane i of words[w].
+/// @param address_of  gives the address of a row by its number
+template <typename Address>
+NACRE_LANES_INLINE void load_rows(const Address& address_of, Ints (&words)[4]) {
+#if defined(__AVX512F__)
+    // Rows 0, 4, 8 and 12 in one register, and so on: the words of a group of four come together without crossing the
+    // parts of a register.
+    __m512i rows[4];
+    unrolled<4>([&](auto row) {
+        const auto part = [&](int group) { return (__m128i)load4(address_of(4 * group + row.at)); };
+        rows[row.at] = _mm512_inserti32x4(
+            _mm512_inserti32x4(_mm512_inserti32x4(_mm512_castsi128_si512(part(0)), part(1), 1), part(2), 2), part(3),
+            3);
+    });
+    const __m512i low01 = _mm512_unpacklo_epi32(rows[0], rows[1]), high01 = _mm512_unpackhi_epi32(rows[0], rows[1]);
+    const __m512i low23 = _mm512_unpacklo_epi32(rows[2], rows[3]), high23 = _mm512_unpackhi_epi32(rows[2], rows[3]);
+    words[0].part[0] = (IntRegister)_mm512_unpacklo_epi64(low01, low23);
+    words[1].part[0] = (IntRegister)_mm512_unpackhi_epi64(low01, low23);
+    words[2].part[0] = (IntRegister)_mm512_unpacklo_epi64(high01, high23);
+    words[3].part[0] = (IntRegister)_mm512_unpackhi_epi64(high01, high23);
+#else
+    alignas(64) std::int32_t lanes[4][16];
+    for (int lane = 0; lane < 16; lane += 4) {
+        Int4 rows[4];
+        for (int i = 0; i < 4; ++i) rows[i] = load4(address_of(lane + i));
+        transpose(rows[0], rows[1], rows[2], rows[3]);
+        for (int word = 0; word < 4; ++word) store4(lanes[word] + lane, rows[word]);
+    }
+    for (int word = 0; word < 4; ++word) words[word] = load(lanes[word]);
+#endif
+}
+/// The other way round, for the first `count` rows.
+template <typename Address>
+NACRE_LANES_INLINE void store_rows(const Ints (&words)[4], std::uint32_t count, const Address& address_of) {
+#if defined(__AVX512F__)
+    const auto word = [&](int i) { return (__m512i)words[i].part[0]; };
+    const __m512i low01 = _mm512_unpacklo_epi32(word(0), word(1)), high01 = _mm512_unpackhi_epi32(word(0), word(1));
+    const __m512i low23 = _mm512_unpacklo_epi32(word(2), word(3)), high23 = _mm512_unpackhi_epi32(word(2), word(3));
+    const __m512i rows[4] = {_mm512_unpacklo_epi64(low01, low23), _mm512_unpackhi_epi64(low01, low23),
+                             _mm512_unpacklo_epi64(high01, high23), _mm512_unpackhi_epi64(high01, high23)};
+    unrolled<16>([&](auto row) {
+        if (static_cast<std::uint32_t>(row.at) < count)
+            store4(address_of(row.at), (Int4)_mm512_extracti32x4_epi32(rows[row.at % 4], row.at / 4));
+    });
+#else
+    alignas(64) std::int32_t lanes[4][16];
+    for (int i = 0; i < 4; ++i) store(lanes[i], words[i]);
+    for (std::uint32_t lane = 0; lane < count; lane += 4) {
+        Int4 rows[4];
+        for (int i = 0; i < 4; ++i) rows[i] = load4(lanes[i] + lane);
+        transpose(rows[0], rows[1], rows[2], rows[3]);
+        for (std::uint32_t i = 0; i < 4 && lane + i < count; ++i)
+            store4(address_of(static_cast<int>(lane + i)), rows[i]);
+    }
+#endif
 }
 
 }  // namespace

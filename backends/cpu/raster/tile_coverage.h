@@ -47,23 +47,21 @@ struct SmallTriangles {
     std::uint32_t cut;    ///< Blocks of the tile hold others too.
 
     void prepare(const TileRun& run, const Record* const* records, std::uint32_t count) {
-        alignas(64) std::int32_t words[8][16];
-        for (std::uint32_t lane = 0; lane < 16; lane += 4)
-            for (int row = 0; row < 2; ++row) {
-                Int4 lines[4];
-                for (std::uint32_t i = 0; i < 4; ++i)
-                    lines[i] =
-                        load4(reinterpret_cast<const std::byte*>(records[lane + i < count ? lane + i : 0]) + 16 * row);
-                transpose(lines[0], lines[1], lines[2], lines[3]);
-                for (int i = 0; i < 4; ++i) store4(words[4 * row + i] + lane, lines[i]);
-            }
+        Ints words[2][4];
+        unrolled<2>([&](auto row) {
+            load_rows(
+                [&](int lane) {
+                    const std::uint32_t from = static_cast<std::uint32_t>(lane) < count ? lane : 0;
+                    return reinterpret_cast<const std::byte*>(records[from]) + 16 * row.at;
+                },
+                words[row.at]);
+        });
         static_assert(offsetof(Record, x) == 0 && offsetof(Record, y) == 12);
         // From the center of the tile's first pixel.
-        Ints x[3], y[3];
-        for (int i = 0; i < 3; ++i) {
-            x[i] = load(words[i]) - ints(run.tile_x * subpixels + subpixels / 2);
-            y[i] = load(words[3 + i]) - ints(run.tile_y * subpixels + subpixels / 2);
-        }
+        const Ints center_x = ints(run.tile_x * subpixels + subpixels / 2);
+        const Ints center_y = ints(run.tile_y * subpixels + subpixels / 2);
+        const Ints x[3] = {words[0][0] - center_x, words[0][1] - center_x, words[0][2] - center_x};
+        const Ints y[3] = {words[0][3] - center_y, words[1][0] - center_y, words[1][1] - center_y};
         const auto bounds = [&](const Ints(&at)[3], std::int32_t begin, std::int32_t turned_last, Ints& low, Ints& high,
                                 Lanes& is_small, Lanes& is_whole) {
             const Ints first =
@@ -275,8 +273,9 @@ struct Coverage {
         x0 = from.first_x[lane], x1 = from.last_x[lane], y0 = from.first_y[lane], y1 = from.last_y[lane];
         const DrawPlan& draw = *run.draw;
         const std::int32_t region_x = x0 / 16, region_y = y0 / 16;
-        if (draw.hierarchical && run.depth && region_x == x1 / 16 && region_y == y1 / 16 &&
-            run.hidden(region_x, region_y, x0, x1, y0, y1, true))
+        // What lies in one region is hard to guess, whether anything may be hidden is not: it is asked first.
+        if (draw.hierarchical && run.depth && run.may_hide(region_x, region_y, true) && region_x == x1 / 16 &&
+            region_y == y1 / 16 && run.hidden(run.region_bounds[region_y * regions_across + region_x], x0, x1, y0, y1))
             return;
         bounded = (from.cut >> lane & 1) != 0;
         const std::int32_t left = x0 / 4, right = x1 / 4, top = y0 / 4, bottom = y1 / 4;
@@ -300,21 +299,21 @@ struct Coverage {
     [[gnu::always_inline]] void run_few_blocks(const SmallTriangles& from, std::uint32_t lane, std::int32_t first_x,
                                                std::int32_t first_y) {
         constexpr int count = columns * rows;
-        const auto column = [](int i) { return i % columns; };
-        const auto row = [](int i) { return i / columns; };
         const Record& record = *run.record;
         const DrawPlan& draw = *run.draw;
         Ints edges_at[count];
-        for (int i = 0; i < 3; ++i) {
-            const Ints along_x = ints(from.along_x[i][lane]), along_y = ints(from.along_y[i][lane]);
+        unrolled<3>([&](auto edge) {
+            const Ints along_x = ints(from.along_x[edge.at][lane]), along_y = ints(from.along_y[edge.at][lane]);
             const Ints right = shift_left<2>(along_x), down = shift_left<2>(along_y);
             Ints at[count];
-            at[0] = along_x * load(lane_x) + along_y * load(lane_y) + ints(from.at_block[i][lane]);
-            for (int block = 1; block < count; ++block)
-                at[block] = column(block) != 0 ? at[block - 1] + right : at[block - columns] + down;
-            for (int block = 0; block < count; ++block)
-                edges_at[block] = i == 0 ? at[block] : edges_at[block] | at[block];
-        }
+            at[0] = along_x * load(lane_x) + along_y * load(lane_y) + ints(from.at_block[edge.at][lane]);
+            if constexpr (columns == 2) at[1] = at[0] + right;
+            if constexpr (rows == 2) at[columns] = at[0] + down;
+            if constexpr (count == 4) at[3] = at[1] + down;
+            unrolled<count>([&](auto block) {
+                edges_at[block.at] = edge.at == 0 ? at[block.at] : edges_at[block.at] | at[block.at];
+            });
+        });
         // As in TileRun::depth_at.
         const Floats x = to_floats(load(lane_x)) + floats(static_cast<float>(run.tile_x + 4 * first_x) + 0.5f);
         const Floats y = to_floats(load(lane_y)) + floats(static_cast<float>(run.tile_y + 4 * first_y) + 0.5f);
@@ -325,18 +324,19 @@ struct Coverage {
         if constexpr (columns == 2) in_x[1] = c + dx * (x + floats(4.0f) - from_x);
         if constexpr (rows == 2) in_y[1] = dy * (y + floats(4.0f) - from_y);
         const std::uint32_t place = block_place(first_x, first_y);
-        std::uint32_t offsets[count];
-        for (int i = 0; i < count; ++i) offsets[i] = four_blocks[2 * row(i) + column(i)];
         std::int32_t* const depth = run.memory.depth[0] + place;
         const DepthLayout layout = run.targets.depth_layout;
         Ints keys[count], old[count];
-        for (int i = 0; i < count; ++i) {
-            keys[i] = depth_key(layout, in_x[column(i)] + in_y[row(i)], run.depth_low, run.depth_high);
-            old[i] = load(depth + offsets[i]);
-        }
+        unrolled<count>([&](auto block) {
+            constexpr int column = block.at % columns, row = block.at / columns;
+            keys[block.at] = depth_key(layout, in_x[column] + in_y[row], run.depth_low, run.depth_high);
+            old[block.at] = load(depth + four_blocks[2 * row + column]);
+        });
         Lanes passes[count];
         const auto test = [&](auto&& comparison) {
-            for (int i = 0; i < count; ++i) passes[i] = not_negative(edges_at[i]) & comparison(keys[i], old[i]);
+            unrolled<count>([&](auto block) {
+                passes[block.at] = not_negative(edges_at[block.at]) & comparison(keys[block.at], old[block.at]);
+            });
         };
         switch (draw.depth_stencil.compare) {
             case rhi::CompareOperation::less: test([](Ints key, Ints at) { return less(key, at); }); break;
@@ -346,28 +346,28 @@ struct Coverage {
             case rhi::CompareOperation::equal: test([](Ints key, Ints at) { return equal(key, at); }); break;
             default: test([&](Ints key, Ints at) { return compare(draw.depth_stencil.compare, key, at); }); break;
         }
-        std::uint32_t masks[count];
         std::uint64_t all = 0;
-        for (int i = 0; i < count; ++i) {
-            masks[i] = mask_of(passes[i]);
-            all |= static_cast<std::uint64_t>(masks[i]) << (16 * i);
-        }
+        unrolled<count>(
+            [&](auto block) { all |= static_cast<std::uint64_t>(mask_of(passes[block.at])) << (16 * block.at); });
+        if (all == 0) return;
         if (draw.depth_stencil.depth_write) {
-            for (int i = 0; i < count; ++i) {
-                store(depth + offsets[i], select(passes[i], keys[i], old[i]));
-                const std::uint32_t bit = (masks[i] != 0 ? 1u : 0u) << (first_x + column(i));
-                std::uint16_t& written = run.written_blocks[first_y + row(i)];
-                written = static_cast<std::uint16_t>(written | bit);
+            unrolled<count>([&](auto block) {
+                constexpr int column = block.at % columns, row = block.at / columns;
+                store(depth + four_blocks[2 * row + column], select(passes[block.at], keys[block.at], old[block.at]));
+            });
+            // Of some of them perhaps nothing was, which does no harm.
+            for (int row = 0; row < rows; ++row) {
+                std::uint16_t& written = run.written_blocks[first_y + row];
+                written = static_cast<std::uint16_t>(written | (columns == 2 ? 3u : 1u) << first_x);
             }
         }
-        if (all == 0) return;
         run.memory.passed_samples += static_cast<std::uint32_t>(__builtin_popcountll(all));
         if (!draw.shades) return;
-        std::uint32_t regions = 0;
-        for (int i = 0; i < count; ++i)
-            regions |= 1u << ((first_y + row(i)) / region_blocks * regions_across +
-                              (first_x + column(i)) / region_blocks);
-        run.append_blocks<columns, rows>(place, masks, regions);
+        const auto region_of = [](std::int32_t block) { return block / region_blocks; };
+        const std::uint32_t across = 1u << region_of(first_x) | 1u << region_of(first_x + columns - 1);
+        const std::uint32_t regions =
+            across << regions_across * region_of(first_y) | across << regions_across * region_of(first_y + rows - 1);
+        run.append_blocks<columns, rows>(place, all, regions);
     }
 
     void draw_triangle() {
@@ -376,7 +376,7 @@ struct Coverage {
         const bool rejects = run.draw->hierarchical && run.depth;
         const std::int32_t region_x = x0 / 16, region_y = y0 / 16;
         if (region_x == x1 / 16 && region_y == y1 / 16) {
-            if (rejects && run.hidden(region_x, region_y, x0, x1, y0, y1, false)) return;
+            if (rejects && run.hidden(region_x, region_y, x0, x1, y0, y1)) return;
             run_blocks(edges, first_x, last_x, first_y, last_y);
             return;
         }
@@ -401,8 +401,10 @@ struct Coverage {
                     for (std::uint32_t s = 0; s < samples; ++s) part.e[s][part.edges] = e[s][i];
                     ++part.edges;
                 }
-                if (outside || (rejects && run.hidden(x, y, left, right, top, bottom, false))) continue;
-                part.bounded = bounded || part.edges < edges;
+                if (outside || (rejects && run.hidden(x, y, left, right, top, bottom))) continue;
+                // Not where they are all of their blocks.
+                const bool cuts_blocks = ((left | top) & 3) != 0 || (right & bottom & 3) != 3;
+                part.bounded = cuts_blocks && (bounded || part.edges < edges);
                 part.run_blocks(part.edges, left / 4, right / 4, top / 4, bottom / 4);
             }
     }

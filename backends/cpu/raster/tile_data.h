@@ -242,11 +242,13 @@ struct alignas(64) Workspace {
 struct TileJob {
     const TargetSet* targets;
     const ChunkView* chunks;
-    std::uint32_t chunk_count;
     const DrawPlan* const* draws;
     std::uint32_t lanes;
     const SrgbTables* srgb;
     const std::uint8_t* uncleared;  ///< For each tile: whether targets that are to be cleared still are to be.
+    /// For each tile a bit for each chunk: whether it has something there. So many words for a tile.
+    const std::uint64_t* tile_chunks;
+    std::uint32_t chunk_words;
 };
 
 /// Vertices of a segment that come from one call of the vertex function.

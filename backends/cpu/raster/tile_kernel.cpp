@@ -8,18 +8,14 @@
 namespace nacre::cpu::raster {
 namespace {
 
-void draw_record(TileRun& run, const Record& record, const std::byte* vertices, const SmallTriangles& small,
-                 std::uint32_t lane) {
-    run.begin_record(record, vertices);
-    if (record.bits & Record::thin_line) {
+/// What is no small triangle.
+[[gnu::noinline]] void draw_record(TileRun& run) {
+    if (run.record->bits & Record::thin_line)
         ThinLine{Coverage<false>(run)}.draw();
-    } else if (run.targets.samples > 1) {
+    else if (run.targets.samples > 1)
         Coverage<true>(run).draw_triangle();
-    } else if (small.small >> lane & 1) {
-        if (small.drawn >> lane & 1) Coverage<false>(run).draw_small(small, lane);
-    } else {
+    else
         Coverage<false>(run).draw_triangle();
-    }
 }
 
 /// Records of the tile in their order, some at a time: their memory is asked for before it is needed.
@@ -36,6 +32,7 @@ struct Queue {
     }
     void drain(TileRun& run) {
         SmallTriangles small;
+        small.small = small.drawn = 0;
         for (std::uint32_t first = 0; first < count;) {
             // Up to sixteen of a draw.
             const std::uint32_t draw = records[first]->draw();
@@ -48,7 +45,12 @@ struct Queue {
                     for (int corner = 0; corner < 3; ++corner)
                         __builtin_prefetch(vertices[i + ahead] +
                                            static_cast<std::size_t>(records[i + ahead]->vertex[corner]) * 16);
-                draw_record(run, *records[i], vertices[i], small, i - first);
+                const std::uint32_t lane = i - first;
+                run.begin_record(*records[i], vertices[i]);
+                if ((small.small >> lane & 1) == 0 || (records[i]->bits & Record::thin_line) != 0)
+                    draw_record(run);
+                else if (small.drawn >> lane & 1)
+                    Coverage<false>(run).draw_small(small, lane);
             }
             first = end;
         }
@@ -59,19 +61,21 @@ struct Queue {
 void draw_tile(const TileJob& job, std::uint32_t tile, Workspace& workspace) {
     TileRun run(job, tile, workspace);
     Queue queue;
-    for (std::uint32_t i = 0; i < job.chunk_count; ++i) {
-        const ChunkView& chunk = job.chunks[i];
-        const std::uint32_t* bin = nullptr;
-        const std::uint32_t* bin_end = nullptr;
-        if (chunk.bin_offsets)
-            bin = chunk.bins + chunk.bin_offsets[tile], bin_end = chunk.bins + chunk.bin_offsets[tile + 1];
-        const std::uint32_t* large = chunk.large;
-        const std::uint32_t* const large_end = large + chunk.large_count;
-        while (bin != bin_end || large != large_end) {
-            const bool from_bin = large == large_end || (bin != bin_end && *bin < *large);
-            queue.push(run, chunk.records[from_bin ? *bin++ : *large++], chunk.vertices);
+    const std::uint64_t* const words = job.tile_chunks + std::size_t{tile} * job.chunk_words;
+    for (std::uint32_t word = 0; word < job.chunk_words; ++word)
+        for (std::uint64_t rest = words[word]; rest != 0; rest &= rest - 1) {
+            const ChunkView& chunk = job.chunks[64 * word + static_cast<std::uint32_t>(__builtin_ctzll(rest))];
+            const std::uint32_t* bin = nullptr;
+            const std::uint32_t* bin_end = nullptr;
+            if (chunk.bin_offsets)
+                bin = chunk.bins + chunk.bin_offsets[tile], bin_end = chunk.bins + chunk.bin_offsets[tile + 1];
+            const std::uint32_t* large = chunk.large;
+            const std::uint32_t* const large_end = large + chunk.large_count;
+            while (bin != bin_end || large != large_end) {
+                const bool from_bin = large == large_end || (bin != bin_end && *bin < *large);
+                queue.push(run, chunk.records[from_bin ? *bin++ : *large++], chunk.vertices);
+            }
         }
-    }
     queue.drain(run);
     run.finish();
 }

@@ -26,13 +26,22 @@ inline constexpr std::int32_t region_size = 4 * region_blocks;
 inline constexpr std::int32_t regions_across = tile_blocks / region_blocks;
 inline constexpr std::int32_t key_lowest = -0x7fffffff - 1, key_highest = 0x7fffffff;
 
-/// The numbers of the quads in a set of four, and behind them whatever.
-alignas(16) constexpr std::int32_t quad_order[16][4] = {
-    {0, 0, 0, 0}, {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {2, 0, 0, 0}, {0, 2, 0, 0}, {1, 2, 0, 0}, {0, 1, 2, 0},
-    {3, 0, 0, 0}, {0, 3, 0, 0}, {1, 3, 0, 0}, {0, 1, 3, 0}, {2, 3, 0, 0}, {0, 2, 3, 0}, {1, 2, 3, 0}, {0, 1, 2, 3}};
-
 /// Where the blocks right of, below, and right below of another lie.
 constexpr std::uint32_t four_blocks[4] = {0, 16, 16 * tile_blocks, 16 * tile_blocks + 16};
+
+/// The places of the quads of some blocks across and down, from the first of them, block by block; then whatever.
+template <int columns, int rows>
+struct QuadPlaces {
+    alignas(64) std::int32_t at[16];
+    constexpr QuadPlaces() : at{} {
+        for (int block = 0; block < columns * rows; ++block)
+            for (int quad = 0; quad < 4; ++quad)
+                at[4 * block + quad] =
+                    static_cast<std::int32_t>(four_blocks[2 * (block / columns) + block % columns]) + 4 * quad;
+    }
+};
+template <int columns, int rows>
+constexpr QuadPlaces<columns, rows> quad_places;
 
 struct TileRun {
     const TileJob& job;
@@ -68,12 +77,17 @@ struct TileRun {
     std::uint32_t next_slot = 0;
     // Blocks that wait as a whole, in a draw that lets them. What waits there and in the stream are different blocks.
     bool keeps_whole = false;
+    bool fills_later = false;  ///< See unfilled_regions.
     std::uint32_t whole_count = 0;
     std::uint32_t whole_primitives = 0;  ///< Primitives whose first block waited as a whole, since nothing waited.
     std::uint32_t appended_beside = 0;   ///< Blocks appended to the stream since the first whole one waits.
     // One bit for each region: colors that are in the tile's memory, those of all targets that the draw writes, and of
     // each.
     std::uint32_t entered_regions = 0, loaded_regions[8] = {};
+    // Blocks that are drawn as a whole need not be filled with what the targets are cleared to before: regions that
+    // have blocks of which that is not known yet, and those blocks. None where another draw begins.
+    std::uint32_t unfilled_regions = 0;
+    std::uint16_t unfilled_blocks[regions_across * regions_across] = {};
     bool front = true;
 
     // Hierarchical depth: for each region a depth that no other is above, or below. Draws that keep the nearer
@@ -158,10 +172,18 @@ struct TileRun {
     }
 
     /// The colors of a region, for all targets that the draw writes; it draws there for the first time.
-    [[gnu::noinline]] void enter_region(std::uint32_t region) {
+    /// @param later  its blocks may be filled when something is drawn to them
+    [[gnu::noinline]] void enter_region(std::uint32_t region, bool later) {
         entered_regions |= 1u << region;
         const std::int32_t x = static_cast<std::int32_t>(region % regions_across) * region_size;
         const std::int32_t y = static_cast<std::int32_t>(region / regions_across) * region_size;
+        if (later && fills_later && x + region_size <= width && y + region_size <= height) {
+            for (std::uint32_t i = 0; i < draw->color_count; ++i)
+                loaded_regions[draw->colors[i].target] |= 1u << region;
+            unfilled_regions |= 1u << region;
+            unfilled_blocks[region] = 0xffff;
+            return;
+        }
         for (std::uint32_t i = 0; i < draw->color_count; ++i) {
             const std::uint32_t index = draw->colors[i].target;
             // Targets with doubles are written where they lie.
@@ -176,6 +198,29 @@ struct TileRun {
                     load_pixels(target.texel_bytes, texels_of(target, sample, x, y), target.row_stride, area);
             }
         }
+    }
+
+    /// @param block  of its region
+    void fill_block(std::uint32_t region, std::uint32_t block) {
+        unfilled_blocks[region] = static_cast<std::uint16_t>(unfilled_blocks[region] & ~(1u << block));
+        std::uint32_t* const pixels = colors_at(
+            block_place(static_cast<std::int32_t>(region % regions_across * region_blocks + block % region_blocks),
+                        static_cast<std::int32_t>(region / regions_across * region_blocks + block / region_blocks)));
+        for (std::uint32_t i = 0; i < draw->color_count; ++i) {
+            const ColorTarget& target = targets.colors[draw->colors[i].target];
+            for (std::uint32_t word = 0; word < target.words; ++word)
+                store(pixels + color_offset(target, 0) + 16 * word,
+                      ints(static_cast<std::int32_t>(target.clear[word])));
+        }
+    }
+    /// Fills what is left of a region.
+    [[gnu::noinline]] void fill_region(std::uint32_t region) {
+        unfilled_regions &= ~(1u << region);
+        for (std::uint32_t rest = unfilled_blocks[region]; rest != 0; rest &= rest - 1)
+            fill_block(region, static_cast<std::uint32_t>(__builtin_ctz(rest)));
+    }
+    void fill_regions() {
+        while (unfilled_regions != 0) fill_region(static_cast<std::uint32_t>(__builtin_ctz(unfilled_regions)));
     }
 
     /// Writes regions of a target back, or fills them where nothing was drawn and they are to be cleared.
@@ -203,17 +248,18 @@ struct TileRun {
 
     void finish() {
         flush();
+        fill_regions();
         for (std::uint32_t i = 0; i < targets.color_count; ++i)
             if (targets.colors[i].data) store_colors(targets.colors[i], loaded_regions[i]);
-        if (targets.streams_colors) end_streams();
         const bool depth_clears = clears && targets.depth_clears, stencil_clears = clears && targets.stencil_clears;
+        // Depth goes the way of the colors: what is too large to stay in the caches need not be read into them.
         for (std::uint32_t sample = 0; sample < targets.samples; ++sample) {
             if (depth_changed || (depth_clears && depth_loaded))
                 store_pixels(depth_bytes(), depth_texels(sample), targets.depth_row_stride,
-                             plane_area(memory.depth, sample), false);
+                             plane_area(memory.depth, sample), targets.streams_colors);
             else if (depth_clears)
                 fill_texels(&targets.clear_depth, depth_bytes(), depth_texels(sample), targets.depth_row_stride, width,
-                            height, false);
+                            height, targets.streams_colors);
             if (stencil_changed || (stencil_clears && stencil_loaded))
                 store_pixels(1, stencil_texels(sample), targets.stencil_row_stride, plane_area(memory.stencil, sample),
                              false);
@@ -221,11 +267,13 @@ struct TileRun {
                 fill_texels(&targets.clear_stencil, 1, stencil_texels(sample), targets.stencil_row_stride, width,
                             height, false);
         }
+        if (targets.streams_colors) end_streams();
     }
 
     void begin_draw(std::uint32_t index) {
         if (index == draw_index) return;
         flush();
+        fill_regions();
         draw_index = index;
         draw = job.draws[index];
         const DepthStencilPlan& plan = draw->depth_stencil;
@@ -243,6 +291,12 @@ struct TileRun {
         entered_regions = ~0u;
         for (std::uint32_t i = 0; i < draw->color_count; ++i) entered_regions &= loaded_regions[draw->colors[i].target];
         keeps_whole = draw->plain_results && job.lanes == 16;
+        fills_later = keeps_whole && clears;
+        for (std::uint32_t i = 0; i < draw->color_count; ++i) {
+            const std::uint32_t target = draw->colors[i].target;
+            // Some of its regions may be drawn to already.
+            fills_later = fills_later && targets.colors[target].clears && loaded_regions[target] == 0;
+        }
         if (draw->plain_results) list_plain_words();
         if (depth) note_bounds(plan);
         const auto larger = [](std::int32_t a, std::int32_t b) { return a > b ? a : b; };
@@ -332,12 +386,9 @@ struct TileRun {
             written_blocks[region_y * region_blocks + y] &= static_cast<std::uint16_t>(~(15u << (4 * region_x)));
     }
 
-    /// Whether no sample of the record in pixels [x0, x1] x [y0, y1] of the tile, all in one region, passes the depth
-    /// test. Floating-point addition and multiplication keep order, so the formula of depth is largest and smallest in
-    /// the corners, bit for bit.
+    /// Whether something of a record in a region may be hidden: there is a bound that says anything.
     /// @param is_small  one of many triangles in the region: it is not measured for each of them
-    [[gnu::always_inline]] bool hidden(std::int32_t region_x, std::int32_t region_y, std::int32_t x0, std::int32_t x1,
-                                       std::int32_t y0, std::int32_t y1, bool is_small) {
+    [[gnu::always_inline]] bool may_hide(std::int32_t region_x, std::int32_t region_y, bool is_small) {
         const std::int32_t region = region_y * regions_across + region_x;
         const std::uint32_t doubts = ++region_doubts[region];
         if (!is_small || doubts % 32 == 0) {
@@ -349,8 +400,15 @@ struct TileRun {
         }
         // Nothing lies before the nearest depth that there is, or behind the farthest.
         const std::int32_t bound_key = region_bounds[region];
-        if (bound == Bound::above ? bound_key >= farthest_key : bound_key <= 0) return false;
-        return hidden(bound_key, x0, x1, y0, y1);
+        return bound == Bound::above ? bound_key < farthest_key : bound_key > 0;
+    }
+    /// Whether no sample of the record in pixels [x0, x1] x [y0, y1] of the tile, all in one region, passes the depth
+    /// test. Floating-point addition and multiplication keep order, so the formula of depth is largest and smallest in
+    /// the corners, bit for bit.
+    [[gnu::always_inline]] bool hidden(std::int32_t region_x, std::int32_t region_y, std::int32_t x0, std::int32_t x1,
+                                       std::int32_t y0, std::int32_t y1) {
+        return may_hide(region_x, region_y, false) &&
+               hidden(region_bounds[region_y * regions_across + region_x], x0, x1, y0, y1);
     }
     [[gnu::noinline]] bool hidden(std::int32_t bound_key, std::int32_t x0, std::int32_t x1, std::int32_t y0,
                                   std::int32_t y1) const {
@@ -410,14 +468,19 @@ struct TileRun {
     [[gnu::always_inline]] void append_block(std::uint32_t stream_index, std::uint32_t place, std::uint32_t live,
                                              const std::uint8_t* covered, const std::uint8_t* alive) {
         const std::uint32_t region = (place >> 10) * regions_across + (place >> 6 & 3);
-        if ((entered_regions >> region & 1) == 0) enter_region(region);
-        if (live == 0xffff && keeps_whole && !waits_in_stream(place)) return append_whole(place);
+        if ((entered_regions >> region & 1) == 0) enter_region(region, true);
+        const std::uint32_t block = (place >> 6 & 12) + (place >> 4 & 3);
+        if (live == 0xffff && keeps_whole && !waits_in_stream(place)) {
+            unfilled_blocks[region] = static_cast<std::uint16_t>(unfilled_blocks[region] & ~(1u << block));
+            return append_whole(place);
+        }
+        if ((unfilled_blocks[region] >> block & 1) != 0) fill_block(region, block);
         if (whole_count != 0 && (waits_as_whole(place) || ++appended_beside == most_primitives_beside)) flush_whole();
         Stream& stream = memory.streams[stream_index];
         const PrimitiveData* const from = &current_primitive();
         const std::uint32_t first = stream.quads;
         repeat_pointer<4>(stream.primitives + first, from);
-        const std::uint32_t used = append_quads(stream, place, live);
+        const std::uint32_t used = append_quads<1, 1>(stream, place, live);
         if (covered) {
             std::uint32_t next = first;
             for (std::uint32_t quad = 0; quad < 4; ++quad) {
@@ -428,19 +491,23 @@ struct TileRun {
         }
         if (stream.quads >= stream_quads) flush_stream(stream_index, stream_quads);
     }
-    /// The same for one or two blocks across and down, with one sample; `live` may be zero for some.
+    /// The same for one or two blocks across and down, with one sample.
+    /// @param live     pixels, 16 bits for each block, which may be zero for some
     /// @param regions  one bit for each that they lie in
     template <int columns, int rows>
-    [[gnu::always_inline]] void append_blocks(std::uint32_t place, const std::uint32_t (&live)[columns * rows],
-                                              std::uint32_t regions) {
-        for (std::uint32_t fresh = regions & ~entered_regions; fresh != 0; fresh &= fresh - 1)
-            enter_region(static_cast<std::uint32_t>(__builtin_ctz(fresh)));
+    [[gnu::always_inline]] void append_blocks(std::uint32_t place, std::uint64_t live, std::uint32_t regions) {
+        for (std::uint32_t fresh = regions & (~entered_regions | unfilled_regions); fresh != 0; fresh &= fresh - 1) {
+            const auto region = static_cast<std::uint32_t>(__builtin_ctz(fresh));
+            if ((unfilled_regions >> region & 1) != 0)
+                fill_region(region);
+            else
+                enter_region(region, false);
+        }
         if (whole_count != 0) flush_whole();
         Stream& stream = memory.streams[0];
         const PrimitiveData* const from = &current_primitive();
         repeat_pointer<4 * columns * rows>(stream.primitives + stream.quads, from);
-        for (int block = 0; block < columns * rows; ++block)
-            append_quads(stream, place + four_blocks[2 * (block / columns) + block % columns], live[block]);
+        append_quads<columns, rows>(stream, place, live);
         if (stream.quads >= stream_quads) flush_stream(0, stream_quads);
     }
     template <int count>
@@ -451,14 +518,13 @@ struct TileRun {
         for (int i = 0; i < count; i += 4) std::memcpy(to + i, &four, sizeof(four));
     }
     /// @return the quads that have a pixel, one bit for each
-    NACRE_LANES_INLINE static std::uint32_t append_quads(Stream& stream, std::uint32_t place, std::uint32_t live) {
-        // All four, one behind the other, and then only those with a pixel count.
-        const Int4 pixels = (static_cast<std::int32_t>(live) >> Int4{0, 4, 8, 12}) & 15;
-        const Int4 entries =
-            (pixels << static_cast<int>(Stream::live_shift)) + (static_cast<std::int32_t>(place) + Int4{0, 4, 8, 12});
-        const std::uint32_t any = (live | live >> 1 | live >> 2 | live >> 3) & 0x1111;
-        const std::uint32_t used = (any | any >> 3 | any >> 6 | any >> 9) & 15;
-        store4(stream.places + stream.quads, shuffled(entries, load4(quad_order[used])));
+    template <int columns, int rows>
+    NACRE_LANES_INLINE static std::uint32_t append_quads(Stream& stream, std::uint32_t place, std::uint64_t live) {
+        const Ints pixels = groups_of_four_bits(live);
+        const std::uint32_t used = mask_of(~equal(pixels, ints(0)));
+        store_packed(stream.places + stream.quads, used,
+                     shift_left<Stream::live_shift>(pixels) +
+                         (load(quad_places<columns, rows>.at) + ints(static_cast<std::int32_t>(place))));
         stream.quads += static_cast<std::uint32_t>(__builtin_popcount(used));
         return used;
     }
@@ -495,11 +561,11 @@ struct TileRun {
     [[gnu::noinline]] void flush_whole() {
         FragmentBatch* const batches = memory.batches + stream_quads / max_quads;
         draw->fragment(draw->context, batches, whole_count);
-        for (std::uint32_t i = 0; i < whole_count; ++i)
-            write_words(batches[i], [&](auto&& each) {
-                each(memory.whole_places[i], 0,
-                     [](std::uint32_t* to, const std::uint32_t* from) { store(to, load(from)); });
-            });
+        for (std::uint32_t i = 0; i < whole_count; ++i) {
+            std::uint32_t* const pixels = colors_at(memory.whole_places[i]);
+            for_plain_words(batches[i],
+                            [&](const std::uint32_t* from, std::uint32_t to) { store(pixels + to, load(from)); });
+        }
         whole_count = 0;
     }
 
@@ -577,38 +643,39 @@ struct TileRun {
         store(batch.centroid_x, floats(batch.sample_x)), store(batch.centroid_y, floats(batch.sample_y));
     }
 
-    /// Calls `write` with what writes the results of a batch where nothing is blended: each(place, lane, copy) calls
-    /// copy(to, from) for each word of the pixels from `lane` on, which lie from `place` on.
-    template <typename Write>
-    NACRE_LANES_INLINE void write_words(const FragmentBatch& batch, const Write& write) {
+    /// Calls `copy(from, to)` for each word of a target that the results of a batch go to where nothing is blended: the
+    /// words of sixteen lanes, and how many words behind the first one of a pixel they lie.
+    template <typename Copy>
+    NACRE_LANES_INLINE void for_plain_words(const FragmentBatch& batch, const Copy& copy) {
         alignas(64) std::uint32_t packed[8][4][16];
         if (plain_from_batch != plain_count)
             for (std::uint32_t i = 0; i < draw->color_count; ++i)
                 if (const ColorPlan& plan = draw->colors[i]; !plan.as_it_is)
                     pack_colors(plan, targets.colors[plan.target], *job.srgb, batch, packed[i]);
-        const std::uint32_t from_batch = plain_from_batch, count = plain_count;
-        const std::size_t block_words = targets.color_planes * 16;
-        std::uint32_t* const colors = memory.colors;
-        const PlainWord* const words = plain_words;
         // What the fragment function has written as it is comes first.
-        write([&](std::uint32_t place, std::uint32_t lane, auto&& copy) {
-            std::uint32_t* const to = colors + (place >> 4) * block_words + (place & 15);
-            std::uint32_t i = 0;
-            for (; i < from_batch; ++i) copy(to + words[i].to, &batch.colors[0][0][0] + words[i].from + lane);
-            for (; i < count; ++i) copy(to + words[i].to, &packed[0][0][0] + words[i].from + lane);
-        });
+        std::uint32_t i = 0;
+        for (; i < plain_from_batch; ++i) copy(&batch.colors[0][0][0] + plain_words[i].from, plain_words[i].to);
+        for (; i < plain_count; ++i) copy(&packed[0][0][0] + plain_words[i].from, plain_words[i].to);
     }
     /// The frequent case of `resolve`: one sample, tested before, nothing blended.
-    void write_plain(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t quads) {
+    template <int quads>
+    void write_plain(const FragmentBatch& batch, const std::uint32_t* places) {
+        std::uint32_t* pixels[quads];
+        unrolled<quads>([&](auto quad) { pixels[quad.at] = colors_at(places[quad.at]); });
         const std::uint32_t live = batch.live;
-        write_words(batch, [&](auto&& each) {
-            for (std::uint32_t quad = 0; quad < quads; ++quad) {
-                // Quads of unfilled batches repeat others, without a live pixel.
-                const std::uint32_t pixels = live >> (4 * quad) & 15;
-                each(places[quad], 4 * quad,
-                     [&](std::uint32_t* to, const std::uint32_t* from) { store_some4(to, load4(from), pixels); });
-            }
+        for_plain_words(batch, [&](const std::uint32_t* from, std::uint32_t to) {
+            // Quads of unfilled batches repeat others, without a live pixel.
+            unrolled<quads>([&](auto quad) {
+                store_some4(pixels[quad.at] + to, load4(from + 4 * quad.at), live >> (4 * quad.at) & 15);
+            });
         });
+    }
+    void write_plain(const FragmentBatch& batch, const std::uint32_t* places, std::uint32_t quads) {
+        switch (quads) {
+            case 1: write_plain<1>(batch, places); break;
+            case 2: write_plain<2>(batch, places); break;
+            default: write_plain<4>(batch, places); break;
+        }
     }
     /// Lists the words that write_plain writes.
     void list_plain_words() {

@@ -18,15 +18,25 @@ using Longs [[gnu::vector_size(64)]] = std::int64_t;
 using HalfFloats [[gnu::vector_size(32)]] = float;
 using HalfInts [[gnu::vector_size(32)]] = std::int32_t;
 
-NACRE_LANES_INLINE Doubles doubles_of(const float* from) {
-    HalfFloats values;
-    std::memcpy(&values, from, sizeof(values));
-    return __builtin_convertvector(values, Doubles);
+/// Half 0 or 1 of sixteen lanes.
+template <int half, typename Half, typename Whole>
+NACRE_LANES_INLINE Half half_of(const Whole& all) {
+    Half values;
+#if defined(__AVX512F__)
+    values = half == 0 ? __builtin_shufflevector(all.part[0], all.part[0], 0, 1, 2, 3, 4, 5, 6, 7)
+                       : __builtin_shufflevector(all.part[0], all.part[0], 8, 9, 10, 11, 12, 13, 14, 15);
+#else
+    std::memcpy(&values, reinterpret_cast<const std::byte*>(&all) + half * sizeof(values), sizeof(values));
+#endif
+    return values;
 }
-NACRE_LANES_INLINE Doubles doubles_of(const std::int32_t* from) {
-    HalfInts values;
-    std::memcpy(&values, from, sizeof(values));
-    return __builtin_convertvector(values, Doubles);
+template <int half>
+NACRE_LANES_INLINE Doubles doubles_of(const Floats& from) {
+    return __builtin_convertvector((half_of<half, HalfFloats>(from)), Doubles);
+}
+template <int half>
+NACRE_LANES_INLINE Doubles doubles_of(const Ints& from) {
+    return __builtin_convertvector((half_of<half, HalfInts>(from)), Doubles);
 }
 NACRE_LANES_INLINE Doubles doubles(double value) { return value - Doubles{}; }
 NACRE_LANES_INLINE Doubles magnitude(Doubles a) { return (Doubles)((Longs)a & 0x7fffffffffffffff); }
@@ -40,33 +50,27 @@ NACRE_LANES_INLINE std::uint32_t mask_of_eight(Longs truth) {
 
 /// Sixteen vertices, value by value.
 struct CornerLanes {
-    alignas(64) std::int32_t x[16], y[16], codes[16], offset[16];
-    alignas(64) float window_x[16], window_y[16], window_z[16];
+    Ints x, y, codes, offset;
+    Floats window_x, window_y, window_z;
 
     /// Where they are; those behind the last triangle repeat the first.
     void gather_fixed(const TriangleSetup& work, std::uint32_t corner) {
-        for (std::uint32_t lane = 0; lane < 16; lane += 4) {
-            Int4 fixed[4];
-            for (std::uint32_t i = 0; i < 4; ++i) {
-                const std::uint32_t triangle = lane + i < work.count ? lane + i : 0;
-                fixed[i] = load4(&work.vertices[work.corners[3 * triangle + corner]]);
-            }
-            transpose(fixed[0], fixed[1], fixed[2], fixed[3]);
-            store4(x + lane, fixed[0]), store4(y + lane, fixed[1]);
-            store4(codes + lane, fixed[2]), store4(offset + lane, fixed[3]);
-        }
+        Ints words[4];
+        load_rows(
+            [&](int lane) {
+                const std::uint32_t triangle = static_cast<std::uint32_t>(lane) < work.count ? lane : 0;
+                return &work.vertices[work.corners[3 * triangle + corner]];
+            },
+            words);
+        x = words[0], y = words[1], codes = words[2], offset = words[3];
     }
     /// What only those need that are drawn.
     void gather_window(const TriangleSetup& work) {
-        for (std::uint32_t lane = 0; lane < 16; lane += 4) {
-            Float4 window[4];
-            for (std::uint32_t i = 0; i < 4; ++i)
-                window[i] = load4(reinterpret_cast<const float*>(
-                    work.screen + static_cast<std::size_t>(static_cast<std::uint32_t>(offset[lane + i])) * 16));
-            transpose(window[0], window[1], window[2], window[3]);
-            store4(window_x + lane, window[0]), store4(window_y + lane, window[1]);
-            store4(window_z + lane, window[2]);
-        }
+        alignas(64) std::uint32_t offsets[16];
+        store(offsets, offset);
+        Ints words[4];
+        load_rows([&](int lane) { return work.screen + static_cast<std::size_t>(offsets[lane]) * 16; }, words);
+        window_x = floats_of_bits(words[0]), window_y = floats_of_bits(words[1]), window_z = floats_of_bits(words[2]);
     }
 };
 
@@ -94,9 +98,8 @@ struct PixelBounds {
     Lanes few;  ///< At most two columns and two rows, of all pixels that there could be.
 };
 NACRE_LANES_INLINE PixelBounds pixel_bounds(const TriangleSetup& work, const CornerLanes (&corners)[3]) {
-    const auto range = [](const std::int32_t* one, const std::int32_t* other, const std::int32_t* third,
-                          std::int32_t begin, std::int32_t end, Ints& low, Ints& high) {
-        const Ints first = load(one), second = load(other), last = load(third);
+    const auto range = [](const Ints& first, const Ints& second, const Ints& last, std::int32_t begin, std::int32_t end,
+                          Ints& low, Ints& high) {
         low = shift_right_signed<subpixel_bits>(minimum(minimum(first, second), last) + ints(subpixels / 2 - 1));
         high = shift_right_signed<subpixel_bits>(maximum(maximum(first, second), last) - ints(subpixels / 2));
         const Lanes few = less(high - low, ints(2));
@@ -142,8 +145,7 @@ inline void set_up_triangles(TriangleSetup& work) {
     const auto has = [](const Ints& codes, std::uint32_t bits) {
         return ~equal(codes & ints(static_cast<std::int32_t>(bits)), ints(0));
     };
-    const Ints any = load(a.codes) | load(b.codes) | load(c.codes);
-    const Ints all = load(a.codes) & load(b.codes) & load(c.codes);
+    const Ints any = a.codes | b.codes | c.codes, all = a.codes & b.codes & c.codes;
     const Lanes outside = has(any, not_finite) | has(all, outside_view | clip_distances_mask | cull_distances_mask);
     const Lanes clipped = has(any, outside_near | outside_far | outside_guard | clip_distances_mask);
 
@@ -152,14 +154,14 @@ inline void set_up_triangles(TriangleSetup& work) {
         mask_of(less(bounds.high_x, bounds.low_x) | less(bounds.high_y, bounds.low_y));
 
     std::uint32_t clockwise = 0, flat = 0;
-    for (int half = 0; half < 16; half += 8) {
+    unrolled<2>([&](auto half) {
         // Differences of coordinates have 24 bits, so that doubles hold the products.
-        const Doubles fixed_x = doubles_of(a.x + half), fixed_y = doubles_of(a.y + half);
-        const Doubles fixed_area = (doubles_of(b.x + half) - fixed_x) * (doubles_of(c.y + half) - fixed_y) -
-                                   (doubles_of(c.x + half) - fixed_x) * (doubles_of(b.y + half) - fixed_y);
-        clockwise |= mask_of_eight(fixed_area > 0.0) << half;
-        flat |= mask_of_eight(fixed_area == 0.0) << half;
-    }
+        const Doubles fixed_x = doubles_of<half.at>(a.x), fixed_y = doubles_of<half.at>(a.y);
+        const Doubles fixed_area = (doubles_of<half.at>(b.x) - fixed_x) * (doubles_of<half.at>(c.y) - fixed_y) -
+                                   (doubles_of<half.at>(c.x) - fixed_x) * (doubles_of<half.at>(b.y) - fixed_y);
+        clockwise |= mask_of_eight(fixed_area > 0.0) << 8 * half.at;
+        flat |= mask_of_eight(fixed_area == 0.0) << 8 * half.at;
+    });
     const std::uint32_t asked = (work.count == 16 ? 0xffffu : (1u << work.count) - 1) & ~mask_of(outside);
     const std::uint32_t front = work.front_is_clockwise ? clockwise : ~clockwise;
     const std::uint32_t culled = flat | (work.cull == rhi::CullMode::front  ? front
@@ -170,38 +172,39 @@ inline void set_up_triangles(TriangleSetup& work) {
     work.drawn = 0;
     if (drawn == 0) return;
     const Lanes keeps = lanes_of(clockwise);
-    const Ints turned_x[3] = {load(a.x), select(keeps, load(b.x), load(c.x)), select(keeps, load(c.x), load(b.x))};
-    const Ints turned_y[3] = {load(a.y), select(keeps, load(b.y), load(c.y)), select(keeps, load(c.y), load(b.y))};
+    const Ints turned_x[3] = {a.x, select(keeps, b.x, c.x), select(keeps, c.x, b.x)};
+    const Ints turned_y[3] = {a.y, select(keeps, b.y, c.y), select(keeps, c.y, b.y)};
     drawn &= ~covers_nothing(bounds, turned_x, turned_y);
     if (drawn == 0) return;
 
     for (CornerLanes& corner : corners) corner.gather_window(work);
     alignas(64) float slope_x[16], slope_y[16], depth[16];
     std::uint32_t thin = 0;
-    for (int half = 0; half < 16; half += 8) {
-        const Doubles x0 = doubles_of(a.window_x + half), y0 = doubles_of(a.window_y + half);
-        const Doubles z0 = doubles_of(a.window_z + half);
-        const Doubles x1 = doubles_of(b.window_x + half) - x0, y1 = doubles_of(b.window_y + half) - y0;
-        const Doubles x2 = doubles_of(c.window_x + half) - x0, y2 = doubles_of(c.window_y + half) - y0;
-        const Doubles z1 = doubles_of(b.window_z + half) - z0, z2 = doubles_of(c.window_z + half) - z0;
+    unrolled<2>([&](auto half) {
+        const Doubles x0 = doubles_of<half.at>(a.window_x), y0 = doubles_of<half.at>(a.window_y);
+        const Doubles z0 = doubles_of<half.at>(a.window_z);
+        const Doubles x1 = doubles_of<half.at>(b.window_x) - x0, y1 = doubles_of<half.at>(b.window_y) - y0;
+        const Doubles x2 = doubles_of<half.at>(c.window_x) - x0, y2 = doubles_of<half.at>(c.window_y) - y0;
+        const Doubles z1 = doubles_of<half.at>(b.window_z) - z0, z2 = doubles_of<half.at>(c.window_z) - z0;
         const Doubles area = x1 * y2 - x2 * y1;
-        thin |= (mask_of_eight(magnitude(area) < thin_area) | (mask_of_eight(area > 0.0) ^ (clockwise >> half & 0xff)))
-                << half;
+        thin |= (mask_of_eight(magnitude(area) < thin_area) |
+                 (mask_of_eight(area > 0.0) ^ (clockwise >> 8 * half.at & 0xff)))
+                << 8 * half.at;
         const Doubles scale = 1.0 / area;
         const Doubles dx = z1 * (y2 * scale) + z2 * (-y1 * scale), dy = z1 * (-x2 * scale) + z2 * (x1 * scale);
         Doubles base = z0;
         if (work.bias != 0.0f || work.bias_slope != 0.0f) {
-            const Doubles largest = larger(larger(magnitude(z0), magnitude(doubles_of(b.window_z + half))),
-                                           magnitude(doubles_of(c.window_z + half)));
+            const Doubles largest = larger(larger(magnitude(z0), magnitude(doubles_of<half.at>(b.window_z))),
+                                           magnitude(doubles_of<half.at>(c.window_z)));
             base = base + depth_bias(work, larger(magnitude(dx), magnitude(dy)), largest);
         }
         const auto put = [&](float* to, Doubles value) {
             const Doubles bounded = magnitude(value) < steepest_slope ? value : Doubles{};
             const HalfFloats rounded = __builtin_convertvector(bounded, HalfFloats);
-            std::memcpy(to + half, &rounded, sizeof(rounded));
+            std::memcpy(to + 8 * half.at, &rounded, sizeof(rounded));
         };
         put(slope_x, dx), put(slope_y, dy), put(depth, base);
-    }
+    });
     work.special |= drawn & thin;
     work.drawn = drawn & ~thin;
     if (work.drawn == 0) return;
@@ -210,40 +213,20 @@ inline void set_up_triangles(TriangleSetup& work) {
     store(work.right, shift_right_signed<tile_bits>(bounds.high_x));
     store(work.top, shift_right_signed<tile_bits>(bounds.low_y));
     store(work.bottom, shift_right_signed<tile_bits>(bounds.high_y));
-    alignas(64) std::int32_t swapped[4][16], bits[16], numbers[16];
-    store(swapped[0], turned_x[1]), store(swapped[1], turned_x[2]);
-    store(swapped[2], turned_y[1]), store(swapped[3], turned_y[2]);
-    store(bits, select(lanes_of(front), ints(Record::front_facing), ints(0)) |
-                    select(keeps, ints(0), ints(Record::swapped)) | ints(static_cast<std::int32_t>(work.draw_bits)));
-    store(numbers, ints(static_cast<std::int32_t>(work.first_primitive)) + load(lane_numbers));
+    const Ints bits = select(lanes_of(front), ints(Record::front_facing), ints(0)) |
+                      select(keeps, ints(0), ints(Record::swapped)) | ints(static_cast<std::int32_t>(work.draw_bits));
+    const Ints numbers = ints(static_cast<std::int32_t>(work.first_primitive)) + load(lane_numbers);
     // Rows of four words of a Record, in its order.
-    const auto word = [](const float* from) { return reinterpret_cast<const std::int32_t*>(from); };
-    const std::int32_t* const words[16] = {a.x,
-                                           swapped[0],
-                                           swapped[1],
-                                           a.y,
-                                           swapped[2],
-                                           swapped[3],
-                                           a.offset,
-                                           b.offset,
-                                           c.offset,
-                                           numbers,
-                                           bits,
-                                           word(depth),
-                                           word(slope_x),
-                                           word(slope_y),
-                                           word(a.window_x),
-                                           word(a.window_y)};
+    const auto put_row = [&](int row, const Ints(&words)[4]) {
+        store_rows(words, 16, [&](int lane) { return reinterpret_cast<std::byte*>(work.records + lane) + 16 * row; });
+    };
+    const auto word = [](const float* from) { return bits_of(load(from)); };
+    put_row(0, {a.x, turned_x[1], turned_x[2], a.y});
+    put_row(1, {turned_y[1], turned_y[2], a.offset, b.offset});
+    put_row(2, {c.offset, numbers, bits, word(depth)});
+    put_row(3, {word(slope_x), word(slope_y), bits_of(a.window_x), bits_of(a.window_y)});
     static_assert(offsetof(Record, y) == 12 && offsetof(Record, vertex) == 24 && offsetof(Record, primitive_id) == 36 &&
                   offsetof(Record, bits) == 40 && offsetof(Record, depth_c) == 44 && offsetof(Record, x0) == 56);
-    for (int lane = 0; lane < 16; lane += 4)
-        for (int row = 0; row < 4; ++row) {
-            Int4 lines[4];
-            for (int i = 0; i < 4; ++i) lines[i] = load4(words[4 * row + i] + lane);
-            transpose(lines[0], lines[1], lines[2], lines[3]);
-            for (int i = 0; i < 4; ++i)
-                store4(reinterpret_cast<std::byte*>(work.records + lane + i) + 16 * row, lines[i]);
-        }
 }
 
 }  // namespace

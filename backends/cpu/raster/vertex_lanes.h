@@ -45,31 +45,24 @@ inline void finish_vertices(const VertexFinish& finish) {
     }
 
     const Floats scale = floats(static_cast<float>(subpixels));
-    alignas(64) std::int32_t fixed_x[16], fixed_y[16], code_of[16];
-    store(fixed_x, round_to_ints(select(inside_guard, window_x, zero) * scale));
-    store(fixed_y, round_to_ints(select(inside_guard, window_y, zero) * scale));
-    store(code_of, codes);
+    const Ints fixed_x = round_to_ints(select(inside_guard, window_x, zero) * scale);
+    const Ints fixed_y = round_to_ints(select(inside_guard, window_y, zero) * scale);
 
-    alignas(64) float window[4][16];
-    store(window[0], window_x), store(window[1], window_y), store(window[2], window_z), store(window[3], inverse_w);
-    const auto write_rows = [&](const float* a, const float* b, const float* c, const float* d, std::size_t offset) {
-        for (std::uint32_t lane = 0; lane < finish.count; lane += 4) {
-            Float4 rows[4] = {load4(a + lane), load4(b + lane), load4(c + lane), load4(d + lane)};
-            transpose(rows[0], rows[1], rows[2], rows[3]);
-            std::byte* const to = finish.vertices + static_cast<std::size_t>(lane) * finish.vertex_bytes + offset;
-            const std::uint32_t left = finish.count - lane;
-            for (std::uint32_t i = 0; i < 4 && i < left; ++i)
-                std::memcpy(to + static_cast<std::size_t>(i) * finish.vertex_bytes, &rows[i], sizeof(Float4));
-        }
+    const auto write_row = [&](const Floats& one, const Floats& other, const Floats& third, const Floats& last,
+                               std::size_t offset) {
+        store_rows({bits_of(one), bits_of(other), bits_of(third), bits_of(last)}, finish.count, [&](int lane) {
+            return finish.vertices + static_cast<std::size_t>(lane) * finish.vertex_bytes + offset;
+        });
     };
-    write_rows(window[0], window[1], window[2], window[3], 0);
-    write_rows(position, position + max_lanes, position + 2 * max_lanes, position + 3 * max_lanes, 16);
+    write_row(window_x, window_y, window_z, inverse_w, 0);
+    write_row(x, y, z, w, 16);
     for (std::uint32_t row = 0; row < finish.row_count; row += 4)
-        write_rows(finish.rows[row], finish.rows[row + 1], finish.rows[row + 2], finish.rows[row + 3], 32 + row * 4);
+        write_row(load(finish.rows[row]), load(finish.rows[row + 1]), load(finish.rows[row + 2]),
+                  load(finish.rows[row + 3]), 32 + row * 4);
 
-    for (std::uint32_t lane = 0; lane < finish.count; ++lane)
-        finish.setup[lane] = {fixed_x[lane], fixed_y[lane], static_cast<std::uint32_t>(code_of[lane]),
-                              finish.first_offset + lane * (finish.vertex_bytes / 16)};
+    const Ints offsets = ints(static_cast<std::int32_t>(finish.first_offset)) +
+                         load(lane_numbers) * ints(static_cast<std::int32_t>(finish.vertex_bytes / 16));
+    store_rows({fixed_x, fixed_y, codes, offsets}, finish.count, [&](int lane) { return finish.setup + lane; });
 }
 
 }  // namespace

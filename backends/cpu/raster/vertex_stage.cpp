@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <bit>
 #include <numeric>
+#include <span>
+
+#include "backends/cpu/raster/simd.h"
 
 namespace nacre::cpu::raster {
 namespace {
@@ -25,15 +28,63 @@ void fetch_indices(const DrawCall& call, std::uint32_t first_element, std::uint3
     const std::uint64_t first = static_cast<std::uint64_t>(call.first) + first_element;
     const std::uint64_t available = call.indices ? call.index_bytes / sizeof(Index) : 0;
     const auto offset = static_cast<std::uint32_t>(call.vertex_offset);
-    for (std::uint32_t i = 0; i < count; ++i) {
-        Index index = 0;
-        if (first + i < available) std::memcpy(&index, call.indices + (first + i) * sizeof(Index), sizeof(index));
+    const auto readable =
+        static_cast<std::uint32_t>(first < available ? std::min<std::uint64_t>(count, available - first) : 0);
+    std::uint32_t i = 0;
+    if (sizeof(Index) == sizeof(*out) && offset == 0 && readable != 0) {
+        std::memcpy(out, call.indices + first * sizeof(Index), readable * sizeof(Index));
+        i = readable;
+    }
+    for (; i < readable; ++i) {
+        Index index;
+        std::memcpy(&index, call.indices + (first + i) * sizeof(Index), sizeof(index));
         out[i] = index + offset;
     }
+    for (; i < count; ++i) out[i] = offset;
+}
+
+struct IndexRange {
+    std::uint32_t lowest, highest;
+};
+IndexRange range_of(std::span<const std::uint32_t> indices) {
+    std::uint32_t lowest = ~0u, highest = 0;
+    std::size_t i = 0;
+    if (indices.size() >= 16) {
+        // Signed numbers keep the order of unsigned ones where the uppermost bit is turned.
+        constexpr std::uint32_t turned = 0x80000000;
+        const Ints turn = ints(static_cast<std::int32_t>(turned));
+        Ints low = load(indices.data()) ^ turn, high = low;
+        for (i = 16; i + 16 <= indices.size(); i += 16) {
+            const Ints next = load(indices.data() + i) ^ turn;
+            low = minimum(low, next), high = maximum(high, next);
+        }
+        std::uint32_t lows[16], highs[16];
+        store(lows, low ^ turn), store(highs, high ^ turn);
+        lowest = *std::ranges::min_element(lows), highest = *std::ranges::max_element(highs);
+    }
+    for (; i < indices.size(); ++i) lowest = std::min(lowest, indices[i]), highest = std::max(highest, indices[i]);
+    return {lowest, highest};
 }
 
 /// Turns the indices in `scratch.locals` into places of `scratch.indices`, which gets each different one once.
 void find_unique(ChunkScratch& scratch) {
+    const auto [lowest, highest] = range_of(scratch.locals);
+    // Those that lie close together have a place for each that there could be.
+    if (const std::size_t range = std::size_t{highest} - lowest + 1; range <= scratch.locals.size()) {
+        constexpr std::uint32_t none = ~0u;
+        scratch.places.assign(range, none);
+        scratch.indices.resize(std::min(range, scratch.locals.size()));
+        std::uint32_t* const places = scratch.places.data();
+        std::uint32_t* const indices = scratch.indices.data();
+        std::uint32_t count = 0;
+        for (std::uint32_t& local : scratch.locals) {
+            std::uint32_t& place = places[local - lowest];
+            if (place == none) indices[count] = local, place = count++;
+            local = place;
+        }
+        scratch.indices.resize(count);
+        return;
+    }
     const std::size_t size = std::bit_ceil(std::max<std::size_t>(64, 4 * scratch.locals.size()));
     if (scratch.cache.size() < size) scratch.cache.assign(size, {}), scratch.generation = 0;
     if (++scratch.generation == 0) {

@@ -10,6 +10,9 @@ llvm::Value* Math::float_to_int(Value* x, unsigned bits, bool is_signed) {
     Term number(emission, x);
     if (number.element()->isHalfTy()) number = convert(number, builder_.getFloatTy());
     llvm::Type* result = number.type_of(builder_.getIntNTy(bits));
+    // The larger of two numbers is the second where the first is NaN.
+    if (!is_signed && bits == 32 && has_conversion_instructions(number))
+        return to_unsigned(max(number, number.number(0))).value();
     if (number.type()->isVectorTy()) {
         // The intrinsic becomes scalar code, lane by lane (LLVM 19). The instruction's result is poison out of range,
         // which is never chosen.

@@ -135,9 +135,10 @@ unsigned lanes_of(const Term& x) {
 }
 
 /// A masked instruction of AVX-512 that does a thing to every lane. Scalars go through the first lane of a vector.
-/// @param intrinsics  for 4, 8 and 16 lanes
+/// @param intrinsics      for 4, 8 and 16 lanes
+/// @param result_element  type of the result in one lane
 Term for_all_lanes(const std::array<llvm::Intrinsic::ID, 3>& intrinsics, std::vector<llvm::Value*> operands,
-                   const Term& x) {
+                   const Term& x, llvm::Type* result_element) {
     llvm::IRBuilder<>& builder = x.builder();
     const unsigned lanes = std::max(lanes_of(x), 4u);
     auto* const vector = llvm::FixedVectorType::get(builder.getFloatTy(), lanes);
@@ -145,7 +146,7 @@ Term for_all_lanes(const std::array<llvm::Intrinsic::ID, 3>& intrinsics, std::ve
     for (llvm::Value*& operand : operands)
         if (operand->getType()->isFloatTy())
             operand = builder.CreateInsertElement(llvm::Constant::getNullValue(vector), operand, std::uint64_t{0});
-    operands.push_back(llvm::Constant::getNullValue(vector));
+    operands.push_back(llvm::Constant::getNullValue(llvm::FixedVectorType::get(result_element, lanes)));
     operands.push_back(llvm::ConstantInt::getAllOnesValue(builder.getIntNTy(std::max(lanes, 8u))));
     constexpr std::uint32_t rounds_as_set = 4;
     if (lanes == 16) operands.push_back(builder.getInt32(rounds_as_set));
@@ -164,20 +165,33 @@ bool has_exponent_instructions(const Term& x) {
 Term exponent_of(const Term& x) {
     using namespace llvm::Intrinsic;
     return for_all_lanes({x86_avx512_mask_getexp_ps_128, x86_avx512_mask_getexp_ps_256, x86_avx512_mask_getexp_ps_512},
-                         {x.value()}, x);
+                         {x.value()}, x, x.element());
 }
 
 Term significand_of(const Term& x) {
     constexpr std::uint32_t from_one_to_two = 0, negative_is_nan = 2 << 2;
     using namespace llvm::Intrinsic;
     return for_all_lanes({x86_avx512_mask_getmant_ps_128, x86_avx512_mask_getmant_ps_256, x86_avx512_mask_getmant_ps_512},
-                         {x.value(), x.builder().getInt32(from_one_to_two | negative_is_nan)}, x);
+                         {x.value(), x.builder().getInt32(from_one_to_two | negative_is_nan)}, x, x.element());
 }
 
 Term times_power_of_two(const Term& x, const Term& exponent) {
     using namespace llvm::Intrinsic;
     return for_all_lanes({x86_avx512_mask_scalef_ps_128, x86_avx512_mask_scalef_ps_256, x86_avx512_mask_scalef_ps_512},
-                         {x.value(), exponent.value()}, x);
+                         {x.value(), exponent.value()}, x, x.element());
+}
+
+bool has_conversion_instructions(const Term& x) {
+    const unsigned lanes = lanes_of(x);
+    return x.emission().options.conversion_instructions && x.element()->isFloatTy() &&
+           (lanes == 4 || lanes == 8 || lanes == 16);
+}
+
+Term to_unsigned(const Term& x) {
+    using namespace llvm::Intrinsic;
+    return for_all_lanes(
+        {x86_avx512_mask_cvttps2udq_128, x86_avx512_mask_cvttps2udq_256, x86_avx512_mask_cvttps2udq_512}, {x.value()}, x,
+        x.builder().getInt32Ty());
 }
 
 Rounded round_to_whole(const Term& x) {

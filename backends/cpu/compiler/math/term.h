@@ -130,6 +130,11 @@ Term significand_of(const Term& x);
 /// x * 2^exponent with one rounding; the exponent is whole.
 Term times_power_of_two(const Term& x, const Term& exponent);
 
+/// Whether MathOptions::conversion_instructions hold for x: vectors of single precision that some register can hold.
+bool has_conversion_instructions(const Term& x);
+/// By that instruction; the largest integer where x is larger. x is not negative, nor NaN.
+Term to_unsigned(const Term& x);
+
 /// Evaluates a function that can only be written for float and double for half too: by way of float.
 template <typename Function, typename... Terms>
 Term widen_half(Function function, const Term& first, const Terms&... others) {

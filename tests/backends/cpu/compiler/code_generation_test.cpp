@@ -22,6 +22,7 @@ TEST(CodeGeneration, UsesTheInstructionsOfTheProcessor) {
         EXPECT_TRUE(options.half_instructions || !has_half);
         // Their results are not the bits of other processors.
         EXPECT_EQ(options.exponent_instructions, contract && has_exponents);
+        EXPECT_EQ(options.conversion_instructions, has_exponents);
     }
 }
 #endif

@@ -72,7 +72,10 @@ TEST(Code, of_sixteen_lanes_is_short_and_calls_nothing) {
         const Code contracted =
             code_of({.processor = "x86-64-v4", .options = {.contract = true, .half_instructions = true}},
                     function.inputs, function.emit);
-        const MathOptions all{.contract = true, .half_instructions = true, .exponent_instructions = true};
+        const MathOptions all{.contract = true,
+                              .half_instructions = true,
+                              .exponent_instructions = true,
+                              .conversion_instructions = true};
         const Code shortest = code_of({.processor = "x86-64-v4", .options = all}, function.inputs, function.emit);
         EXPECT_LE(code.instructions, function.most + 3) << function.name;
         EXPECT_LE(contracted.instructions, code.instructions) << function.name;

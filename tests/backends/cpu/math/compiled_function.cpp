@@ -122,7 +122,7 @@ std::string Variant::name() const {
     return std::to_string(lanes) + " lanes, " + (processor.empty() ? "host" : processor) +
            (options.contract ? ", contract" : "") + (options.half_instructions ? ", half instructions" : "") +
            (options.exponent_instructions ? ", exponent instructions" : "") +
-           (optimized ? ", optimized" : "");
+           (options.conversion_instructions ? ", conversion instructions" : "") + (optimized ? ", optimized" : "");
 }
 
 std::vector<Variant> measured_variants() {
@@ -137,12 +137,18 @@ std::vector<Variant> measured_variants() {
 }
 
 std::vector<Variant> exact_variants() {
-    return {
+    std::vector<Variant> variants{
         {.lanes = 16, .optimized = true},        {.lanes = 1},
         {.lanes = 4, .optimized = true},         {.lanes = 8},
         {.lanes = 4, .processor = "x86-64"},     {.lanes = 1, .processor = "x86-64", .optimized = true},
         {.lanes = 16, .processor = "x86-64-v3"},
     };
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx512vl"))
+        for (const unsigned lanes : {16u, 8u, 4u, 1u})
+            variants.push_back({.lanes = lanes, .options = {.conversion_instructions = true}});
+#endif
+    return variants;
 }
 
 struct CompiledFunction::Program {

@@ -231,6 +231,59 @@ TEST(Clears, FillWhatIsNotDrawn) {
                 }
 }
 
+TEST(Clears, FillWhatSmallTrianglesLeaveOfTheBlocksOfLargeOnes) {
+    constexpr std::uint32_t side = 64, none = 12345;
+    // A large one that leaves the upper left block and covers others of its region as a whole or in part, and one in
+    // that block.
+    const Point large[3] = {{64 * 256, -40 * 256}, {64 * 256, 64 * 256}, {-40 * 256, 64 * 256}};
+    const Point small[3] = {{256, 256}, {3 * 256, 256}, {256, 3 * 256}};
+    const auto texel = [](std::uint32_t value) {
+        std::array<std::byte, 16> bytes{};
+        std::memcpy(bytes.data(), &value, sizeof(value));
+        return bytes;
+    };
+    for (const std::uint32_t lanes : {4u, 8u, 16u})
+        for (const std::uint32_t instruction_set : {0u, 1u, 2u})
+            for (const bool small_first : {false, true})
+                for (const bool draws_twice : {false, true}) {
+                    TestImage color(Format::r32_uint, side, side), depth(Format::d32_float, side, side);
+                    Bench bench(side, side, {&color}, &depth,
+                                {.lanes = lanes, .options = {.instruction_set = instruction_set}});
+                    bench.targets().color_clears = {texel(none)};
+                    bench.targets().depth_clear.emplace();
+                    bench.begin();
+                    bench.use<TestShader::primitive_id>(1);
+                    bench.pipeline.depth_stencil.depth_test = true;
+                    bench.pipeline.depth_stencil.depth_write = true;
+                    bench.pipeline.depth_stencil.depth_compare = CompareOperation::greater;
+                    std::vector<TestVertex> vertices;
+                    for (const bool is_small : {small_first, !small_first}) {
+                        for (const Point& corner : is_small ? small : large)
+                            vertices.push_back(at_window(static_cast<double>(corner.x) / 256,
+                                                         static_cast<double>(corner.y) / 256, side, side));
+                        if (!draws_twice) continue;
+                        bench.draw(vertices);
+                        vertices.clear();
+                    }
+                    if (!draws_twice) bench.draw(vertices);
+                    bench.end();
+                    std::size_t of_large = 0, of_small = 0;
+                    for (std::uint32_t y = 0; y < side; ++y)
+                        for (std::uint32_t x = 0; x < side; ++x) {
+                            const Point place{x * 256 + 128, y * 256 + 128};
+                            const bool in_small = covers(small[0], small[1], small[2], place);
+                            const bool in_large = covers(large[0], large[1], large[2], place);
+                            of_small += in_small, of_large += in_large;
+                            const std::uint32_t expected = !in_small && !in_large                     ? none
+                                                           : !draws_twice && in_small == !small_first ? 2
+                                                                                                      : 1;
+                            ASSERT_EQ(color.at<std::uint32_t>(x, y), expected)
+                                << lanes << instruction_set << small_first << draws_twice << ": " << x << ", " << y;
+                        }
+                    ASSERT_TRUE(of_small != 0 && of_large > 1000);
+                }
+}
+
 TEST(Clears, LargeTargetsHoldWhatIsDrawnAndFilled) {
     // Larger than what caches keep: another way to memory, if rows are aligned.
     const struct {
