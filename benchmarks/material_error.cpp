@@ -3,7 +3,8 @@
 /// How far layered closures are off what a random walk through the same stack says (materials/random_walk.h), for the
 /// stacks of materials/reference_stacks.h:
 ///
-///     material_error_benchmark [--paths N] [--stacks N] [--ball SIZE] [--json FILE] [--pictures FOLDER]
+///     material_error_benchmark [--paths N] [--stacks N] [--ball SIZE] [--ball-paths N] [--ball-strata N]
+///                              [--json FILE] [--pictures FOLDER]
 ///
 /// Prints a table: error of the directional albedo (mean and largest over channels and view angles) and FLIP between
 /// the lit balls. FOLDER gets the balls side by side: closures, walk, difference times four. Exit status 1 where one of
@@ -53,13 +54,14 @@ std::string file_name(std::string name) {
 }  // namespace
 
 int main(int count, char** arguments) {
-    std::uint32_t paths = 65536, random_stacks = 48, ball = 128, ball_paths = 16384;
+    std::uint32_t paths = 65536, random_stacks = 48, ball = 128, ball_paths = 16384, ball_strata = 16;
     std::string json, pictures;
     CLI::App app("Layered closures against a random walk through the stack.");
     app.add_option("--paths", paths, "Paths for each view angle");
     app.add_option("--stacks", random_stacks, "Random stacks beside the five");
     app.add_option("--ball", ball, "Pixels of the balls' side; 0: none");
     app.add_option("--ball-paths", ball_paths, "Paths for each angle on a ball");
+    app.add_option("--ball-strata", ball_strata, "Squared: directions by which a closure's pixel is lit");
     app.add_option("--json", json, "File for all figures");
     app.add_option("--pictures", pictures, "Folder for the balls");
     CLI11_PARSE(app, count, arguments);
@@ -82,7 +84,8 @@ int main(int count, char** arguments) {
         const LayeringError error = layering_error(*flat, walk, paths);
         double flip = 0.0;
         if (ball > 0) {
-            const Image closures = preview_ball(*flat, ball, 16), walked = walked_ball(walk, ball, ball_paths);
+            const Image closures = preview_ball(*flat, ball, static_cast<int>(ball_strata));
+            const Image walked = walked_ball(walk, ball, ball_paths);
             flip = measure::compute_flip(walked, closures)->mean;
             if (!pictures.empty()) {
                 const auto file = std::filesystem::path(pictures) / file_name(stacks[i].name);

@@ -71,10 +71,13 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
                 break;
             case StepKind::track_slab: slabs[step.result] = library.track_slab(slabs[step.a], widenings[step.b]); break;
             case StepKind::slab_matter:
-                matters[step.result] =
-                    library.slab_matter(slabs[step.a], library.prepare_closure(slabs[step.a], view, footprint));
+                matters[step.result] = library.slab_matter(
+                    slabs[step.a],
+                    library.prepare_closure(slabs[step.a], library.view_below(view, widenings[step.b]), footprint));
                 break;
-            case StepKind::base_matter: matters[step.result] = library.base_matter(slabs[step.a], view.z); break;
+            case StepKind::base_matter: matters[step.result] = 
+                    library.base_matter(slabs[step.a], library.view_below(view, widenings[step.b]).z);
+                break;
             case StepKind::cover_matter: matters[step.result] = library.cover_matter(matters[step.a], amount); break;
             case StepKind::mix_matter:
                 matters[step.result] = library.mix_matter(matters[step.a], matters[step.b], amount);
@@ -86,7 +89,8 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
                 paths[step.result] = library.path_through_mix(paths[step.a], amount);
                 break;
             case StepKind::path_through_layer:
-                paths[step.result] = library.path_through_layer(paths[step.a], matters[step.b], matters[step.c]);
+                paths[step.result] = library.path_through_layer(paths[step.a], matters[step.b], matters[step.c],
+                                                              widenings[step.d]);
                 break;
         }
     }
@@ -97,10 +101,9 @@ ShadedTree shade(const FlattenedTree& tree, const glm::dvec3& view, double footp
         result.rotation = tree.visible_tree.frames[closure.frame].rotation;
         result.frame_slot = static_cast<std::uint32_t>(std::ranges::find(topology.frames, closure.frame) -
                                                        topology.frames.begin());
-        result.closure =
-            library.cover_closure(library.prepare_closure(result.slab, turned(view, result.rotation), footprint),
-                                  result.path.spread, result.path.under_interface);
-        result.coverage = library.slab_coverage(result.slab, view.z);
+        result.closure = library.closure_below(result.slab, result.path, turned(view, result.rotation), footprint);
+        result.coverage =
+            library.slab_coverage(result.slab, library.refracted_direction(view, result.path.ior_excess).z);
         shaded.closures.push_back(result);
     }
     return shaded;

@@ -317,13 +317,18 @@ struct RandomWalk::Model {
         glm::dvec3 direction = -view;
         std::size_t at = 0;       // the slab that the path is in, or comes to where it is outside
         std::size_t deepest = 0;  // slabs from here on have not been met
+        std::uint32_t ground_reflections = 0;
+        const auto left = [&] {
+            return WalkExit{
+                .direction = direction, .weight = light.weight(), .ground_reflections = ground_reflections};
+        };
         bool outside = true;
         double place = 0.0;
         for (std::uint32_t event = 0; event < desc.longest_path; ++event) {
             if (!survives(light, random)) return {};
             if (outside && direction.z > 0.0) {
                 // Up from the interface of `at`.
-                if (at == 0) return {.direction = direction, .weight = light.weight()};
+                if (at == 0) return left();
                 --at;
                 outside = false;
                 place = 1.0;
@@ -334,11 +339,12 @@ struct RandomWalk::Model {
                     gather(tree.root, choices, stack);
                 }
                 deepest = std::max(deepest, at + 1);
-                if (at == stack.size) return {.direction = direction, .weight = light.weight()};
+                if (at == stack.size) return left();
                 const Leaf& leaf = leaves[stack.slabs[at]];
                 if (leaf.is_ground) {
                     if (!meet_ground(leaf, direction, light, random)) return {};
-                    if (direction.z < 0.0) return {.direction = direction, .weight = light.weight()};
+                    ++ground_reflections;
+                    if (direction.z < 0.0) return left();
                 } else {
                     if (meets_fuzz(leaf, -direction, random)) {
                         direction = fuzz_direction(leaf, -direction, light, random);

@@ -56,6 +56,9 @@ struct WalkExit {
     glm::dvec3 direction{0.0};  ///< Unit, away from the surface: z > 0 reflected, z < 0 through all of the stack.
     /// Of radiance from there; 0 where the path was absorbed. The mean over paths is what the stack sends to the view.
     glm::dvec3 weight{0.0};
+    /// How often the opaque ground sent the path on: 0 is light that the layers above it reflect, 1 what passed them
+    /// twice, more what they threw back to it in between.
+    std::uint32_t ground_reflections = 0;
     bool is_unfinished = false;  ///< RandomWalkDesc::longest_path was reached.
 };
 

@@ -63,7 +63,8 @@ constexpr StorageFormat formats[] = {
     {StorageValue::path_transmittance, "path transmittance", color_bits, StorageCodec::color},
     {StorageValue::path_uncovered, "path uncovered", 6, StorageCodec::unit},
     {StorageValue::path_spread, "path spread", 6, StorageCodec::unit},
-    {StorageValue::path_under_interface, "path under interface", 6, StorageCodec::unit},
+    {StorageValue::path_ior_excess, "path ior excess", 6, StorageCodec::unit, 0.0, 1.6},
+    {StorageValue::path_bend, "path bend", 4, StorageCodec::unit},
 };
 
 // Fields of features, in the order of the stream.
@@ -110,7 +111,8 @@ void for_each_closure_field(std::uint32_t index, std::uint32_t closure_count, st
         field(StorageValue::path_transmittance);
         field(StorageValue::path_uncovered);
         field(StorageValue::path_spread);
-        field(StorageValue::path_under_interface);
+        field(StorageValue::path_ior_excess);
+        field(StorageValue::path_bend);
     } else if (closure_count > 1) {
         field(StorageValue::grey_weight);
     }
@@ -421,8 +423,11 @@ StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, co
                                      (closure->path.spread.r + closure->path.spread.g + closure->path.spread.b) / 3.0,
                                      next_dither());
                 break;
-            case StorageValue::path_under_interface:
-                code = encode_number(format, field.bits, closure->path.under_interface, next_dither());
+            case StorageValue::path_ior_excess:
+                code = encode_number(format, field.bits, closure->path.ior_excess, next_dither());
+                break;
+            case StorageValue::path_bend:
+                code = encode_number(format, field.bits, closure->path.bend, next_dither());
                 break;
             default: {
                 Library::Slab slab = closure->slab;
@@ -509,8 +514,10 @@ Expected<UnpackedMaterial> unpack_pixel(const StoredPixel& pixel) {
                 result.path.uncovered = glm::dvec3(decode_number(format, format.bits, code));
             } else if (value == StorageValue::path_spread) {
                 result.path.spread = glm::dvec3(decode_number(format, format.bits, code));
-            } else if (value == StorageValue::path_under_interface) {
-                result.path.under_interface = decode_number(format, format.bits, code);
+            } else if (value == StorageValue::path_ior_excess) {
+                result.path.ior_excess = decode_number(format, format.bits, code);
+            } else if (value == StorageValue::path_bend) {
+                result.path.bend = decode_number(format, format.bits, code);
             } else if (value == StorageValue::medium_transmittance) {
                 const glm::dvec3 transmittance = library.unpack_color(code);
                 for (int channel = 0; channel < 3; ++channel) {

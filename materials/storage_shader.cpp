@@ -193,8 +193,10 @@ class Writer {
             case StorageValue::path_spread:
                 return encode(format, field.bits, fmt::format("dot(state.paths[{}].spread, vec3(1.0 / 3.0))", closure),
                               next_dither());
-            case StorageValue::path_under_interface:
-                return encode(format, field.bits, fmt::format("state.paths[{}].under_interface", closure), next_dither());
+            case StorageValue::path_ior_excess:
+                return encode(format, field.bits, fmt::format("state.paths[{}].ior_excess", closure), next_dither());
+            case StorageValue::path_bend:
+                return encode(format, field.bits, fmt::format("state.paths[{}].bend", closure), next_dither());
             default: break;
         }
         std::string value = fmt::format("state.slabs[{}].{}", closure, member_of(field.value));
@@ -338,7 +340,8 @@ StoredClosure read_stored_closure(inout StoredHeader header, uint index, float t
         closure.path.transmittance = {};
         closure.path.uncovered = vec3({});
         closure.path.spread = vec3({});
-        closure.path.under_interface = {};
+        closure.path.ior_excess = {};
+        closure.path.bend = {};
 #endif
     }} else if (header.closure_count > 1u) {{
         closure.path.weight = vec3({});
@@ -350,8 +353,8 @@ StoredClosure read_stored_closure(inout StoredHeader header, uint index, float t
 #endif
 )",
           read(StorageValue::medium_transmittance), read(StorageValue::weight), read(StorageValue::path_transmittance),
-          read(StorageValue::path_uncovered), read(StorageValue::path_spread), read(StorageValue::path_under_interface),
-          read(StorageValue::grey_weight));
+          read(StorageValue::path_uncovered), read(StorageValue::path_spread), read(StorageValue::path_ior_excess),
+          read(StorageValue::path_bend), read(StorageValue::grey_weight));
     return text;
 }
 

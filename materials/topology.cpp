@@ -32,6 +32,7 @@ class Flattener {
         bool is_one_slab = false;         // a leaf, or blended to one
         std::uint32_t slab = Step::none;  // register, where it is one
         std::uint32_t base_matter = Step::none, matter = Step::none, spread = Step::none;
+        std::uint32_t widening = 0;         // of what lies above; the first is none
         std::uint32_t amount = Step::none;  // index into Topology::amounts
         std::uint32_t features = 0;
         std::uint32_t frame = 0;
@@ -137,6 +138,7 @@ class Flattener {
     void track(NodeIndex index, std::uint32_t widening, bool is_bottom) {
         const Node& node = tree_.nodes[index];
         NodeState& state = nodes_[index];
+        state.widening = widening;
         if (state.is_one_slab) {
             if (widening == 0) return;
             // Its own spread is that of its interface as it is.
@@ -160,7 +162,9 @@ class Flattener {
         if (need == Need::base && state.base_matter != Step::none) return state.base_matter;
         Step made{};
         if (state.is_one_slab) {
-            made = {.kind = need == Need::all ? StepKind::slab_matter : StepKind::base_matter, .a = state.slab};
+            made = {.kind = need == Need::all ? StepKind::slab_matter : StepKind::base_matter,
+                    .a = state.slab,
+                    .b = state.widening};
         } else if (node.kind == NodeKind::coverage) {
             made = {.kind = StepKind::cover_matter, .a = matter(node.first, need), .amount = state.amount};
         } else if (node.kind == NodeKind::mix) {
@@ -233,9 +237,12 @@ class Flattener {
                     ground =
                         step({.kind = StepKind::layer_matter, .a = ground, .b = below}, topology_.matter_registers);
                 hand_down(node.first, path, ground, is_top, false);
-                const std::uint32_t under = step(
-                    {.kind = StepKind::path_through_layer, .a = path, .b = matter(node.first, Need::all), .c = ground},
-                    topology_.path_registers);
+                const std::uint32_t under = step({.kind = StepKind::path_through_layer,
+                                                  .a = path,
+                                                  .b = matter(node.first, Need::all),
+                                                  .c = ground,
+                                                  .d = nodes_[node.second].widening},
+                                                 topology_.path_registers);
                 hand_down(node.second, under, below, false, is_bottom);
                 break;
             }

@@ -31,13 +31,13 @@ enum class StepKind : std::uint8_t {
     layer_spread,        ///< spread: a over b
     widening_below,      ///< widening: below spread b, where a is that above it
     track_slab,          ///< slab: a, as rough as it is seen through widening b
-    slab_matter,         ///< matter: of slab a, everything
-    base_matter,         ///< matter: of slab a, only what a layer above needs: coverage and albedo
+    slab_matter,         ///< matter: of slab a below widening b, everything
+    base_matter,         ///< matter: of slab a below widening b, only what a layer above needs: coverage and albedo
     cover_matter,        ///< matter: a with less coverage
     mix_matter,          ///< matter: a and b side by side
     layer_matter,        ///< matter: a over b
     path_through_mix,    ///< path: a, of which the amount (or the rest, where `complement`) is left
-    path_through_layer,  ///< path: a under matter b, in a base whose matter is c
+    path_through_layer,  ///< path: a under matter b, in a base whose matter is c, as it is seen through widening d
 };
 
 /// One step; see StepKind for which of the operands it has.

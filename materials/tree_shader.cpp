@@ -200,13 +200,13 @@ class Printer {
                     break;
                 case StepKind::slab_matter:
                     print(
-                        "    Matter matter_{0} = slab_matter(slab_{1}, prepare_closure(slab_{1}, views[{2}], "
-                        "footprint));\n",
-                        step.result, step.a, slots[step.a]);
+                        "    Matter matter_{0} = slab_matter(slab_{1}, prepare_closure(slab_{1}, view_below(views[{2}], "
+                        "widening_{3}), footprint));\n",
+                        step.result, step.a, slots[step.a], step.b);
                     break;
                 case StepKind::base_matter:
-                    print("    Matter matter_{} = base_matter(slab_{}, views[{}].z);\n", step.result, step.a,
-                          slots[step.a]);
+                    print("    Matter matter_{} = base_matter(slab_{}, view_below(views[{}], widening_{}).z);\n", step.result,
+                          step.a, slots[step.a], step.b);
                     break;
                 case StepKind::cover_matter:
                     print("    Matter matter_{} = cover_matter(matter_{}, {});\n", step.result, step.a, amount);
@@ -222,8 +222,8 @@ class Printer {
                     print("    Path path_{} = path_through_mix(path_{}, {});\n", step.result, step.a, amount);
                     break;
                 case StepKind::path_through_layer:
-                    print("    Path path_{} = path_through_layer(path_{}, matter_{}, matter_{});\n", step.result,
-                          step.a, step.b, step.c);
+                    print("    Path path_{} = path_through_layer(path_{}, matter_{}, matter_{}, widening_{});\n",
+                          step.result, step.a, step.b, step.c, step.d);
                     break;
             }
         }
@@ -234,7 +234,7 @@ class Printer {
             print(
                 "    state.slabs[{0}] = slab_{1};\n    state.slabs[{0}].features = {4}u;\n    state.paths[{0}] = "
                 "path_{2};\n"
-                "    state.coverages[{0}] = slab_coverage(slab_{1}, views[{3}].z);\n",
+                "    state.coverages[{0}] = slab_coverage(slab_{1}, refracted_direction(views[{3}], path_{2}.ior_excess).z);\n",
                 i, closure.slab, closure.path, frame_slot(closure.frame), closure.features);
         }
         print("    return state;\n}}\n");
@@ -249,12 +249,9 @@ class Printer {
             const TopologyClosure& closure = topology_.closures[i];
             const std::size_t slot = frame_slot(closure.frame);
             // Layers change nothing of what lies open.
-            const std::string open = fmt::format("prepare_closure(slab, views[{}], footprint)", slot);
             const std::string prepared =
-                closure.path == 0
-                    ? open
-                    : fmt::format("cover_closure({0}, state.paths[{1}].spread, state.paths[{1}].under_interface)", open,
-                                  i);
+                closure.path == 0 ? fmt::format("prepare_closure(slab, views[{}], footprint)", slot)
+                                  : fmt::format("closure_below(slab, state.paths[{}], views[{}], footprint)", i, slot);
             print(
                 "    vec3 weight_{0} = state.paths[{0}].weight * state.coverages[{0}];\n"
                 "    if (largest(weight_{0}) > 0.0) {{\n"

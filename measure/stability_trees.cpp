@@ -188,10 +188,17 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
             for (const ShadedClosure& c : shaded.closures) {
                 const double weight = std::max({c.path.weight.x, c.path.weight.y, c.path.weight.z}) * c.coverage;
                 // What the lobes would send if they reflected everything: as lobe_scale() of stability_functions.glsl.
-                const glm::dvec3 h = library.half_vector(c.closure.view, p.light);
-                double scale = library.specular_lobe_pdf(c.closure.specular, c.closure.view, p.light, h);
+                // Below a layer the lobes are in refracted directions.
+                const glm::dvec3 light = library.refracted_direction(p.light, c.closure.ior_excess);
+                const glm::dvec3 h = library.half_vector(c.closure.view, light);
+                double scale = library.specular_lobe_pdf(c.closure.specular, c.closure.view, light, h);
                 if ((c.slab.features & slab_second_lobe) != 0)
-                    scale += library.specular_lobe_pdf(c.closure.second, c.closure.view, p.light, h);
+                    scale += library.specular_lobe_pdf(c.closure.second, c.closure.view, light, h);
+                if (c.closure.ior_excess > 0.0) {
+                    scale += library.specular_lobe_pdf(c.closure.again, c.closure.again_view, light,
+                                                       library.half_vector(c.closure.again_view, light));
+                    scale *= std::max(double{p.light.z}, 0.0) / (std::pow(1.0 + c.closure.ior_excess, 2.0) * light.z);
+                }
                 if ((c.slab.features & slab_fuzz) != 0) scale += library.sheen_density(c.closure.fuzz_map, p.light);
                 values[8] += weight * scale;
             }

@@ -96,6 +96,24 @@ float refracted_cosine(float cos_theta, float f0) {
     return sqrt(4.0 * root + square(cos_theta * (1.0 - root))) / (1.0 + root);
 }
 
+// What Fresnel's equations let through of unpolarized light, by the cosines outside and inside a medium of index `ior`.
+// No term is negative.
+float dielectric_transmittance(float cosine, float inner_cosine, float ior) {
+    float across = cosine / (cosine + ior * inner_cosine);
+    float along = cosine / (ior * cosine + inner_cosine);
+    return 2.0 * ior * inner_cosine / cosine * (across * across + along * along);
+}
+
+// A direction as it goes on below, in a medium whose index is 1 + `ior_excess`. Every term is positive, as above.
+vec3 refracted_direction(vec3 direction, float ior_excess) {
+    float inverse = 1.0 / (1.0 + ior_excess);
+    float inside = sqrt(ior_excess * (ior_excess + 2.0) + direction.z * direction.z) * inverse;
+    return vec3(direction.x * inverse, direction.y * inverse, ior_excess > 0.0 ? inside : direction.z);
+}
+
+// 1 - 1 / ior^2.
+float refraction_bend(float ior_excess) { return ior_excess * (ior_excess + 2.0) / square(1.0 + ior_excess); }
+
 // Reflectance at normal incidence of what lies under a medium of index coat_ior, from its reflectance in air. Exact for
 // dielectrics: the index comes back from the reflectance.
 float reflectance_under(float f0, float coat_ior) {

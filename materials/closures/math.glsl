@@ -25,6 +25,10 @@ float minus_log_rest(float x) {
     return x < 0.05 ? x * (1.0 + x * (0.5 + x * (1.0 / 3.0 + x * (0.25 + x * 0.2)))) : -log(max(1.0 - x, 1e-37));
 }
 
+// 1 - (1 - a)(1 - b), for what happens here or there, with all digits where both are small.
+float either(float a, float b) { return a + b * (1.0 - a); }
+vec3 either(vec3 a, vec3 b) { return a + b * (vec3(1.0) - a); }
+
 float largest(vec3 v) { return max(v.x, max(v.y, v.z)); }
 float saturated(float x) { return clamp(x, 0.0, 1.0); }
 

@@ -16,53 +16,53 @@ float roughness_to_variance(float roughness) {
 float variance_to_roughness(float variance) { return sqrt(pow(variance / (1.0 + variance), 1.0 / 1.1)); }
 
 // Variance that a rough interface adds to what is seen through it: refraction of the view on its way in and of the
-// light on its way out, each as wide outside as a lobe whose alpha is scaled by half of |n - 1| (Belcour 2018), at
+// light on its way out, each as wide inside as a lobe whose alpha is scaled by half of |1 - 1 / n| (Belcour 2018), at
 // normal incidence. A base of any roughness counts alike.
 float refraction_variance(float roughness, float ior) {
-    float a = pow(min(0.5 * (ior - 1.0) * roughness * roughness, 0.9999), 1.1);
+    float a = pow(min(0.5 * (1.0 - 1.0 / ior) * roughness * roughness, 0.9999), 1.1);
     return 2.0 * a / (1.0 - a);
 }
 
-// A lobe that leaves a denser medium is wider outside by its index; its variance is a power of alpha.
-float refraction_stretch(float ior) { return pow(ior, 1.1); }
+// A lobe that enters a denser medium is narrower inside by its index; its variance is a power of alpha.
+float refraction_squeeze(float ior) { return pow(ior, -1.1); }
 
-// How much wider what lies below is seen: its variance times `stretch`, and `variance` in addition.
+// How what lies below is seen: in the directions that are refracted into a medium of some index against what is above
+// all matter, and its lobes there with `variance` in addition.
 struct Widening {
-    float stretch;
+    float ior_excess;  // index - 1: small ones keep their digits, which grazing directions need
     float variance;
 };
 
 Widening no_widening() {
     Widening widening;
-    widening.stretch = 1.0;
+    widening.ior_excess = 0.0;
     widening.variance = 0.0;
     return widening;
 }
 
 // Perceptual roughness of a slab as it is seen through what widens it.
 float tracked_roughness(float roughness, Widening widening) {
-    if (widening.variance <= 0.0 && widening.stretch <= 1.0) return roughness;
-    return variance_to_roughness(roughness_to_variance(roughness) * widening.stretch + widening.variance);
+    if (widening.variance <= 0.0) return roughness;
+    return variance_to_roughness(roughness_to_variance(roughness) + widening.variance);
 }
+
+// The view as a slab meets it.
+vec3 view_below(vec3 view, Widening widening) { return refracted_direction(view, widening.ior_excess); }
 
 // What the operators of a tree do to the matter they arrange: what is tracked follows Hillaire and de Rousiers,
 // "Authoring Materials that matter", SIGGRAPH 2023; the formulae are ours. Any subtree counts as one piece of matter
 // whose parts lie independently of each other, so that a slab yields one closure whatever is above it.
 
-// 1 - (1 - a)(1 - b), for what happens here or there, with all digits where both are small.
-float either(float a, float b) { return a + b * (1.0 - a); }
-vec3 either(vec3 a, vec3 b) { return a + b * (vec3(1.0) - a); }
-
 // How much what is seen through a subtree spreads. Known before any closure is, since closures depend on it.
 struct Spread {
     float coverage;
-    float stretch;   // of the variance of what lies below, by the covered share
-    float variance;  // that the covered share adds to it
+    float ior_excess;  // index - 1 of the covered share, against what lies above it
+    float variance;    // that the covered share adds to what lies below, inside
 };
 
-// What a layer does with light from below: what it throws back, what leaves it, and the rest, which has its own formulae:
-// light that is thrown back and forth many times shows how much is taken each time, and 1 - back - leaving would not have
-// its digits. What the medium takes of light that leaves is not in it, but in Matter::transmittance.
+// What a layer does with light from below: what it throws back, what leaves it, and the rest, which has its own
+// formulae: light that is thrown back and forth many times shows how much is taken each time, and 1 - back - leaving
+// would not have its digits. What the medium takes of light that leaves is not in it, but in Matter::transmittance.
 struct Underside {
     vec3 back;
     vec3 leaving;
@@ -83,11 +83,13 @@ struct Matter {
     vec3 passed;              // of diffuse light from above, what reaches the other side
     vec3 absorbed;            // of diffuse light from above, the rest
     vec3 gloss;               // share of what is reflected towards the view that a lobe mirrors
-    float alpha2;             // squared GGX alpha of that lobe, as it is seen from outside
+    float alpha2;             // squared GGX alpha of that lobe, as it is seen from directly above
     float ior;                // against what lies above
-    float under_interface;    // of light from above, share that comes through an interface
-    vec3 scattered;           // of light that passes, share that was scattered, and not only forwards
-    float cos_view;
+    float bend;               // 1 - 1 / ior^2 of what `transmittance` lies in: how directions turn towards the normal
+    // Of light that is mirrored below and seen in the view direction, the share that was scattered on its way down or up,
+    // and not only forwards.
+    vec3 scattered;
+    float cos_view;           // of the view as it comes from above
 };
 
 // How a slab is seen through all that lies above it.
@@ -96,7 +98,8 @@ struct Path {
     vec3 uncovered;         // share of `weight` that passes by all matter above, [0, 1]
     vec3 transmittance;     // of the rest for light, along the normal; top_transmittance turns it to the light
     vec3 spread;            // share of what a lobe mirrors that comes up as diffuse light
-    float under_interface;  // share of the light that comes through an interface
+    float ior_excess;       // index - 1 of what lies directly above the slab, against what is above all matter
+    float bend;             // 1 - 1 / ior^2 of what `transmittance` lies in
 };
 
 #ifndef NACRE_SLAB_EDGE_COVERAGE
@@ -107,14 +110,13 @@ float slab_bare(Slab slab, float cos_theta) { return max(1.0 - slab.coverage, 0.
 Spread slab_spread(Slab slab, float cos_view) {
     Spread spread;
     spread.coverage = slab_coverage(slab, cos_view);
-    spread.stretch = 1.0;
+    spread.ior_excess = 0.0;
     spread.variance = 0.0;
 #ifdef NACRE_SLAB_MEDIUM
     // Nothing is seen through the others.
     if ((slab.features & slab_medium) != 0u) {
-        float ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
-        spread.stretch = refraction_stretch(ior);
-        spread.variance = refraction_variance(slab.roughness, ior);
+        spread.ior_excess = medium_ior_excess(dot(slab.f0, vec3(1.0 / 3.0)));
+        spread.variance = refraction_variance(slab.roughness, 1.0 + spread.ior_excess);
     }
 #endif
     return spread;
@@ -130,16 +132,20 @@ Spread mix_spread(Spread a, Spread b, float amount) {
     Spread spread;
     spread.coverage = (1.0 - amount) * a.coverage + amount * b.coverage;
     float share = amount * b.coverage / max(spread.coverage, 1e-30);
-    spread.stretch = mix(a.stretch, b.stretch, share);
+    spread.ior_excess = mix(a.ior_excess, b.ior_excess, share);
     spread.variance = mix(a.variance, b.variance, share);
     return spread;
 }
 
+// Directions are refracted by no more; stored materials count on it.
+const float largest_ior = 2.6;
+
 // What lies below a layer, by what is above both.
 Widening widening_below(Widening above, Spread top) {
     Widening widening;
-    widening.stretch = above.stretch * mix(1.0, top.stretch, top.coverage);
-    widening.variance = above.variance + above.stretch * top.coverage * top.variance;
+    float excess = top.ior_excess * top.coverage;
+    widening.ior_excess = min(above.ior_excess + excess + above.ior_excess * excess, largest_ior - 1.0);
+    widening.variance = above.variance * refraction_squeeze(1.0 + excess) + top.coverage * top.variance;
     return widening;
 }
 
@@ -149,7 +155,7 @@ Spread layer_spread(Spread top, Spread base) {
     Spread spread;
     spread.coverage = top.coverage + (1.0 - top.coverage) * base.coverage;
     float covered = max(spread.coverage, 1e-30);
-    spread.stretch = 1.0 + (both.stretch - 1.0) / covered;
+    spread.ior_excess = both.ior_excess / covered;
     spread.variance = both.variance / covered;
     return spread;
 }
@@ -177,7 +183,7 @@ Matter no_matter() {
     m.gloss = vec3(0.0);
     m.alpha2 = 0.0;
     m.ior = 1.0;
-    m.under_interface = 0.0;
+    m.bend = 0.0;
     m.scattered = vec3(0.0);
     m.cos_view = 1.0;
     return m;
@@ -197,7 +203,8 @@ Path open_path() {
     path.uncovered = vec3(1.0);
     path.transmittance = vec3(1.0);
     path.spread = vec3(0.0);
-    path.under_interface = 0.0;
+    path.ior_excess = 0.0;
+    path.bend = 0.0;
     return path;
 }
 
@@ -214,6 +221,9 @@ Underside underside_of(vec3 leaving, vec3 inwards, vec3 reflected, vec3 through,
     return u;
 }
 
+// Of light that the interface keeps as well as it can, the share that leaves: that of diffuse light to this power.
+const float shut_exponent = 4.0;
+
 // What a layer above a slab needs to know of it: the albedo is that under diffuse light.
 Matter base_matter(Slab slab, float cos_view) {
     Matter m = no_matter();
@@ -221,8 +231,9 @@ Matter base_matter(Slab slab, float cos_view) {
     m.bare = slab_bare(slab, cos_view);
     m.cos_view = cos_view;
     m.alpha2 = square(square(slab.roughness));
-    m.ior = medium_ior(dot(slab.f0, vec3(1.0 / 3.0)));
-    m.under_interface = saturated(largest(slab.f0) / smallest_reflectance);
+    float excess = medium_ior_excess(dot(slab.f0, vec3(1.0 / 3.0)));
+    m.ior = 1.0 + excess;
+    m.bend = refraction_bend(excess);
     vec3 leaving = internal_transmittance(slab);
     vec3 inwards = internal_reflectance(slab);
     // Of the medium, and of the medium under its interface.
@@ -241,14 +252,16 @@ Matter base_matter(Slab slab, float cos_view) {
         reflected = medium.reflected;
         through = medium.through + medium.straight;
         absorbed = medium.absorbed;
-        scattered = medium.through / max(through, vec3(1e-30));
+        // What lets nothing through scatters.
+        scattered = (medium.through + vec3(1e-30)) / (through + vec3(1e-30));
         vec3 between = vec3(1.0) / max(medium.kept + leaving * reflected, vec3(1e-30));
         albedo = min(reflected * leaving * between, vec3(1.0));
         passed = through * between;
         lost = absorbed * between;
-        m.scattered = scattered * (1.0 - max(slab.phase_anisotropy, 0.0));
+        // Of light from all around on its way down, that which is thrown back counts as well.
+        m.scattered = either(scattered, medium.reflected);
         m.transmittance =
-            exp(log(clamp(through / max(medium.kept, vec3(1e-30)), vec3(1e-30), vec3(1.0))) * mean_cosine);
+            exp(log(clamp((through + vec3(1e-30)) / (medium.kept + vec3(1e-30)), vec3(1e-30), vec3(1.0))) * mean_cosine);
     }
 #endif
     Fresnel fresnel = slab_fresnel(slab);
@@ -261,11 +274,8 @@ Matter base_matter(Slab slab, float cos_view) {
     m.diffuse = underside_of(leaving, inwards, reflected, through, absorbed);
     // Light that was scattered on its way in is diffuse when it comes back.
     m.mirrored =
-        mix_underside(underside_of(fresnel_transmittance(fresnel, cos_view), fresnel_reflectance(fresnel, cos_view),
-                                   reflected, through, absorbed),
-                      m.diffuse, scattered);
-    // A fit: 0.124 at index 1.5, for lobes so narrow that they hardly let anything escape that was reflected once.
-    vec3 steps = 2.3 * vec3(minus_log_rest(inwards.x), minus_log_rest(inwards.y), minus_log_rest(inwards.z));
+        mix_underside(underside_of(vec3(1.0) - slab.f0, slab.f0, reflected, through, absorbed), m.diffuse, scattered);
+    vec3 steps = shut_exponent * vec3(minus_log_rest(inwards.x), minus_log_rest(inwards.y), minus_log_rest(inwards.z));
     m.trapped = mix_underside(
         underside_of(exp(-steps), vec3(exponential_rest(steps.x), exponential_rest(steps.y), exponential_rest(steps.z)),
                      reflected, through, absorbed),
@@ -284,47 +294,60 @@ Matter base_matter(Slab slab, float cos_view) {
 // A slab as what lies below and around it sees it.
 Matter slab_matter(Slab slab, Closure closure) {
     Matter m = base_matter(slab, closure.view.z);
-    m.view_transmittance = closure_throughput(closure) + closure_albedo(closure).transmission;
+    vec3 straight = closure_throughput(closure);
+    vec3 through = closure_albedo(closure).transmission;
+    m.view_transmittance = straight + through;
+#ifdef NACRE_SLAB_MEDIUM
+    if ((slab.features & slab_medium) != 0u) {
+        // Up by the view's own share. Down it comes at the same angle: what goes straight falls with the way's length.
+        vec3 up = (through + vec3(1e-30)) / (m.view_transmittance + vec3(1e-30));
+        float way = mean_cosine / max(refracted_cosine(closure.view.z, closure.reflectance), 0.01);
+        vec3 down = vec3(exponential_rest(minus_log_rest(m.scattered.x) * way),
+                         exponential_rest(minus_log_rest(m.scattered.y) * way),
+                         exponential_rest(minus_log_rest(m.scattered.z) * way));
+        m.scattered = either(up, down) * (1.0 - max(slab.phase_anisotropy, 0.0));
+    }
+#endif
     return m;
 }
 
 // What a layer throws back to the base below it, again and again. Diffuse light: (1 - K) / (1 - E K) (OpenPBR, "Coat
-// darkening"). What a lobe mirrors meets the layer's surface as the view did, K near Fresnel's reflectance, and the
-// more as diffuse light does the wider the lobe is; what was totally reflected comes back at such angles again. Both
-// widths are fits to random walks between a GGX lobe and a smooth interface of index 1.5, off by 0.1; the layer's own
-// facets turn light half as far as those of the base.
+// darkening"). What a lobe mirrors follows leaving_shares: reflection by reflection, since what was totally reflected
+// comes back at such angles again. The layer's own facets turn light half as far as those of the base.
 struct Bounces {
     vec3 leaving;   // of what the base reflects, by its first reflection
     vec3 arriving;  // at the base, by what arrives there first
-    vec3 spread;    // share of `leaving` that the first reflection's lobe does not hold any more
     vec3 absorbed;  // of what arrives at the base first, by base, underside and Matter::transmittance of what leaves
 };
 
+// The underside of a layer as light meets it that a lobe mirrors, by what share a clear interface of the layer's index
+// lets out of it, and the rest, diffuse light.
+Underside underside_by_share(Matter top, float leaving, vec3 gloss) {
+    float open = 1.0 - ior_to_reflectance(top.ior);
+    float shut = square(square(leaving_mean(top.ior)));
+    float share = saturated((open - leaving) / max(open - shut, 1e-6));
+    return mix_underside(top.diffuse, mix_underside(top.mirrored, top.trapped, vec3(share)), gloss);
+}
+
 Bounces bounces_between(Matter top, Matter base) {
-    // Inside the layer the lobe is as narrow as it was before it was refracted.
-    float alpha = max(sqrt(base.alpha2 / square(top.ior) + 0.25 * top.alpha2), 1e-6);
-    float cosine = max(base.cos_view, 0.01);
-    vec3 width = vec3(1.0 - exp(-7.0 * pow(alpha, 0.3 + 1.5 * cosine)));
-    vec3 width_later = vec3(1.0 - exp(-60.0 * pow(alpha, 1.35) / pow(cosine, 1.7)));
-    vec3 narrow = vec3(exp(-alpha / 0.27));
-    Underside first = mix_underside(top.diffuse, mix_underside(top.mirrored, top.diffuse, width), base.gloss);
-    Underside returning = mix_underside(top.diffuse, top.trapped, narrow);
-    Underside later = mix_underside(top.diffuse, mix_underside(top.mirrored, returning, width_later), base.gloss);
+    float alpha = min(sqrt(base.alpha2 + 0.25 * top.alpha2), 1.0);
+    LeavingShares shares = leaving_shares(alpha, top.cos_view, top.ior);
+    Underside first = underside_by_share(top, shares.first, base.gloss);
+    Underside second = underside_by_share(top, shares.second, base.gloss);
+    Underside later = underside_by_share(top, shares.later, base.gloss);
     // 1 - back * albedo by positive terms: nothing is lost where both are 1.
     vec3 left = later.leaving + later.absorbed + later.back * (base.passed + base.absorbed) + vec3(1e-9);
     vec3 again = first.back * base.albedo;
+    vec3 thrice = again * second.back * base.albedo / left;
     Bounces bounces;
-    vec3 again_leaving = again * (later.leaving + vec3(1e-9)) / left;
-    bounces.leaving = first.leaving + again_leaving;
-    // Light that was thrown back still leaves about along the lobe for more than a half (by random walks as well).
-    bounces.spread = 0.4 * width_later * again_leaving / max(bounces.leaving, vec3(1e-30));
-    bounces.arriving = vec3(1.0) + again / left;
+    bounces.leaving = first.leaving + again * second.leaving + thrice * (later.leaving + vec3(1e-9));
+    bounces.arriving = vec3(1.0) + again + thrice;
     // 1 - albedo * leaving * transmittance - passed * arriving, multiplied out.
     vec3 taken = vec3(1.0) - top.transmittance;
     bounces.absorbed =
-        base.absorbed +
-        base.albedo * (first.leaving * taken + first.absorbed +
-                       first.back / left * (base.absorbed + base.albedo * (later.absorbed + later.leaving * taken)));
+        base.absorbed * bounces.arriving +
+        base.albedo * (first.leaving * taken + first.absorbed + again * (second.leaving * taken + second.absorbed) +
+                       thrice * (later.leaving * taken + later.absorbed));
     return bounces;
 }
 
@@ -343,10 +366,22 @@ Matter cover_matter(Matter m, float amount) {
 vec3 gloss_of_both(Matter a, vec3 reflected_a, Matter b, vec3 reflected_b) {
     return (reflected_a * a.gloss + reflected_b * b.gloss) / max(reflected_a + reflected_b, vec3(1e-30));
 }
-float alpha2_of_both(Matter a, vec3 reflected_a, Matter b, vec3 reflected_b) {
-    float mirrored_a = largest(reflected_a * a.gloss);
-    float mirrored_b = largest(reflected_b * b.gloss);
-    return (mirrored_a * a.alpha2 + mirrored_b * b.alpha2) / max(mirrored_a + mirrored_b, 1e-30);
+float alpha2_of_both(float alpha2_a, vec3 mirrored_a, float alpha2_b, vec3 mirrored_b) {
+    float a = largest(mirrored_a);
+    float b = largest(mirrored_b);
+    return (a * alpha2_a + b * alpha2_b) / max(a + b, 1e-30);
+}
+
+// How much it tells of a medium in which directions light crosses it.
+float medium_weight(vec3 transmittance, vec3 scattered) {
+    return -log(clamp(dot(transmittance, vec3(1.0 / 3.0)), 1e-3, 1.0)) + dot(scattered, vec3(1.0 / 3.0));
+}
+
+// Of two media, by that and by how much each covers.
+float bend_of_both(float bend_a, float weight_a, float bend_b, float weight_b) {
+    // What hardly absorbs or scatters bends nothing that tells, and of what takes all but a thousandth no digits are
+    // left.
+    return (weight_a * bend_a + weight_b * bend_b) / (weight_a + weight_b + 1e-5);
 }
 
 // Side by side: a on 1 - amount of the surface, b on the rest.
@@ -367,9 +402,10 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     m.passed = mix(a.passed, b.passed, share);
     m.absorbed = mix(a.absorbed, b.absorbed, share);
     m.gloss = gloss_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
-    m.alpha2 = alpha2_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
+    m.alpha2 = alpha2_of_both(a.alpha2, covered_a * a.albedo * a.gloss, b.alpha2, covered_b * b.albedo * b.gloss);
     m.ior = mix(a.ior, b.ior, share);
-    m.under_interface = mix(a.under_interface, b.under_interface, share);
+    m.bend = bend_of_both(a.bend, covered_a * medium_weight(a.transmittance, a.scattered), b.bend,
+                          covered_b * medium_weight(b.transmittance, b.scattered));
     m.scattered = mix(a.scattered, b.scattered, share);
     m.cos_view = a.cos_view;
     return m;
@@ -417,11 +453,13 @@ Matter layer_matter(Matter top, Matter base) {
     vec3 of_top = (t + tb) * top.albedo;
     vec3 of_base = b * base.albedo + tb * below;
     m.gloss = gloss_of_both(top, of_top, base, of_base);
-    m.alpha2 = alpha2_of_both(top, of_top, base, of_base);
-    m.under_interface = either(top.under_interface * (t + tb), base.under_interface * (b + tb));
+    m.alpha2 = alpha2_of_both(top.alpha2, of_top * top.gloss,
+                              base.alpha2 * square(mix(1.0, top.ior, tb / max(b + tb, 1e-30))), of_base * base.gloss);
+    m.bend = bend_of_both(top.bend, (t + tb) * medium_weight(top.transmittance, top.scattered),
+                          either(top.bend, base.bend), (b + tb) * medium_weight(base.transmittance, base.scattered));
     m.scattered = either(top.scattered * (t + tb), base.scattered * (b + tb));
     m.ior = mix(1.0, top.ior, t + tb) * mix(1.0, base.ior, b + tb);
-    m.cos_view = base.cos_view;
+    m.cos_view = top.cos_view;
     return m;
 }
 
@@ -434,35 +472,63 @@ Path path_through_mix(Path path, float amount) {
 
 // A path that comes up from the base of a layer under `top`; `base` is all that lies below the top, to the bottom of
 // the material: light that is thrown back may hit any part of it.
-Path path_through_layer(Path path, Matter top, Matter base) {
+Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     vec3 beside = vec3(top.bare);
-    Bounces bounces = bounces_between(top, base);
-    vec3 through = top.coverage * top.view_transmittance * bounces.leaving;
+    // What was scattered above on its way up is diffuse light here.
+    vec3 scattered = scattered_up(path.spread);
+    Matter seen = top;
+    seen.cos_view = mix(top.cos_view, mean_cosine, dot(scattered, vec3(1.0 / 3.0)));
+    Bounces bounces = bounces_between(seen, base);
+    vec3 through = top.coverage * mix(top.view_transmittance, top.passed, scattered) * bounces.leaving;
     vec3 sum = beside + through;
     // Where nothing comes through the rest does not matter.
     vec3 by = beside / max(sum, vec3(1e-30));
     Path above;
     above.weight = path.weight * sum;
-    // Scattered on its way to the base or on its way back.
-    vec3 blurred = either(bounces.spread, either(top.scattered, top.scattered));
-    above.spread = either(path.spread, blurred * through / max(sum, vec3(1e-30)));
-    // One number for all channels: by what each lets through, since what another would see does not matter.
-    float covered_share = dot(through, vec3(1.0)) / max(dot(sum, vec3(1.0)), 1e-30);
-    above.under_interface = either(path.under_interface, top.under_interface * covered_share);
+    vec3 spread_by_top = top.scattered * through / max(sum, vec3(1e-30));
+    above.spread = either(path.spread, spread_by_top);
+    above.ior_excess = widening.ior_excess;
     above.uncovered = path.uncovered * by;
     // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
     // that stands for both is between.
-    vec3 kept = mix(path.transmittance, vec3(1.0), path.uncovered) * mix(top.transmittance, vec3(1.0), by);
+    vec3 kept_above = mix(path.transmittance, vec3(1.0), path.uncovered);
+    vec3 kept_by_top = mix(top.transmittance, vec3(1.0), by);
+    vec3 kept = kept_above * kept_by_top;
+    above.bend = bend_of_both(path.bend, medium_weight(kept_above, path.spread),
+                              either(refraction_bend(path.ior_excess), top.bend),
+                              medium_weight(kept_by_top, spread_by_top));
     vec3 covered = max(vec3(1.0) - above.uncovered, vec3(1e-30));
     above.transmittance = min(max(kept - above.uncovered, vec3(0.0)) / covered, vec3(1.0));
     return above;
 }
 
-// Light's way down to a slab, from the cosine outside: the layers' transmittance along the refracted direction (index
-// 1.5, that of nearly all coats), and 1 on the uncovered share.
+// A closure of a slab that was prepared for the view refracted by path.ior_excess, under all that lies above it.
+// view_cosine: outside.
+Closure closure_below_path(Closure closure, Slab slab, Path path, float view_cosine) {
+    Cover cover;
+    cover.spread = path.spread;
+    cover.mean = fresnel_mean(slab_fresnel(slab));
+    // Light that is thrown back goes through the medium that is as dense as what lies directly above, not through what
+    // lies above that.
+    float dense = saturated(path.bend / max(refraction_bend(path.ior_excess), 1e-6));
+    vec3 twice = exp(log(max(path.transmittance, vec3(1e-30))) * (2.0 / max(closure.view.z, 0.1)));
+    cover.kept = mix(vec3(1.0), mix(twice, vec3(1.0), path.uncovered), dense);
+    cover.bend = path.bend;
+    cover.ior_excess = path.ior_excess;
+    cover.view_cosine = view_cosine;
+    return cover_closure(closure, cover);
+}
+
+// The closure of a slab as it is seen through all that lies above it, by the view outside.
+Closure closure_below(Slab slab, Path path, vec3 view, float footprint) {
+    Closure closure = prepare_closure(slab, refracted_direction(view, path.ior_excess), footprint);
+    return closure_below_path(closure, slab, path, view.z);
+}
+
+// Light's way down to a slab, from the cosine outside: the layers' transmittance along the refracted direction, and 1
+// on the uncovered share. Where nothing refracts, no light from below a hundredth comes through what tells.
 vec3 top_transmittance(Path path, float cos_light) {
-    float sin2 = (1.0 - cos_light * cos_light) * (1.0 / 2.25);
-    float inverse_cosine = inversesqrt(1.0 - sin2);
+    float inverse_cosine = inversesqrt(max(path.bend + cos_light * cos_light * (1.0 - path.bend), 1e-4));
     vec3 along = exp(log(max(path.transmittance, vec3(1e-30))) * inverse_cosine);
     return mix(along, vec3(1.0), path.uncovered);
 }

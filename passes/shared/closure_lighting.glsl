@@ -34,8 +34,9 @@ vec3 closure_radiance(Slab slab, Path path, StoredFrame frame, LitPoint point
     vec3 result = vec3(0.0);
     if (largest(path.weight) > 0.0) {
         vec3 view = view_in_frame(frame, point.to_viewer);
-        Closure closure = cover_closure(prepare_lit_closure(slab, slab_fresnel(slab), view, point.footprint),
-                                        path.spread, path.under_interface);
+        vec3 inside = refracted_direction(view, path.ior_excess);
+        Closure closure = closure_below_path(prepare_lit_closure(slab, slab_fresnel(slab), inside, point.footprint), slab,
+                                             path, view.z);
         ClosureValue surroundings = environment_value(slab, closure, frame, point);
         result = surroundings.specular * top_transmittance(path, view.z) +
                  (surroundings.diffuse + surroundings.subsurface) * top_transmittance(path, mean_cosine);

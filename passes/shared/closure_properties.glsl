@@ -13,8 +13,7 @@ void closure_properties(vec3 to_viewer, float footprint, out vec3 albedo, out ve
         vec3 weight = path.weight * state.coverages[i];
         if (largest(weight) <= 0.0) continue;
         vec3 view = view_in_frame(stored_frame(frames, tree_closure_frame(i)), to_viewer);
-        Closure closure = prepare_closure(state.slabs[i], view, footprint);
-        ClosureAlbedo own = closure_albedo(cover_closure(closure, path.spread, path.under_interface));
+        ClosureAlbedo own = closure_albedo(closure_below(state.slabs[i], path, view, footprint));
         albedo += weight * (own.specular * top_transmittance(path, view.z) +
                             (own.fuzz + own.diffuse) * top_transmittance(path, mean_cosine));
     }

@@ -155,7 +155,15 @@ ClosureValue environment_value(Slab slab, Closure closure, StoredFrame frame, Li
 #ifdef NACRE_SLAB_ANISOTROPY
     if ((slab.features & slab_anisotropy) != 0u) anisotropy = slab.anisotropy;
 #endif
-    vec3 specular_light = environment_lobe(frame, point.to_viewer, slab.roughness, anisotropy);
+    float roughness = slab.roughness;
+#ifdef NACRE_CLOSURE_COVERED
+    // What leaves a denser medium is wider outside; one look serves what was thrown back as well.
+    if (closure.ior_excess > 0.0) {
+        float share = largest(closure.again.albedo) / max(largest(albedo.specular), 1e-30);
+        roughness = min(sqrt((1.0 + closure.ior_excess) * sqrt(mix(closure.specular.area, closure.again.area, share))), 1.0);
+    }
+#endif
+    vec3 specular_light = environment_lobe(frame, point.to_viewer, roughness, anisotropy);
     ClosureValue value;
     value.specular = point.occlusion * albedo.specular * specular_light;
 #ifdef NACRE_SLAB_SECOND_LOBE

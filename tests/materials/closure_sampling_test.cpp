@@ -112,6 +112,31 @@ TEST(ClosureSampling, SamplesFollowTheDensity) {
     }
 }
 
+// Under a layer of index 1.5, in directions that are refracted: what is reflected totally is lost, never sent.
+TEST(ClosureSampling, SamplesBelowALayerFollowTheDensity) {
+    Library library;
+    const long samples = sample_count(100000);
+    const std::vector<Case> all = cases();
+    const double limit = 1.0 - std::pow(0.99, 1.0 / (4.0 * static_cast<double>(all.size() * std::size(view_angles))));
+    std::uint64_t seed = 200;
+    for (const Case& test : all) {
+        for (const double cosine : view_angles) {
+            const glm::dvec3 view = direction(cosine, 0.4);
+            const auto inside = library.prepare_closure(Library::slab_of(test.slab),
+                                                        library.refracted_direction(view, 0.5), 1e-3);
+            const auto closure = library.cover_closure(inside, {.spread = glm::dvec3(0.2),
+                                                                .mean = glm::dvec3(0.5),
+                                                                .kept = glm::dvec3(1.0),
+                                                                .bend = 0.0,
+                                                                .ior_excess = 0.5,
+                                                                .view_cosine = cosine});
+            EXPECT_GT(smallest_probability(library, closure, narrowest_angle(test.slab, cosine), samples, ++seed),
+                      limit)
+                << test.name << " seen at cosine " << cosine;
+        }
+    }
+}
+
 TEST(ClosureSampling, ADensityThatIsWrongByOnePercentIsFound) {
     Library library;
     for (const Case& test : cases()) {

@@ -4,10 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
 
+#include "materials/closures/lobes.h"
+#include "materials/random_walk.h"
 #include "tests/materials/random_tree.h"
 
 namespace nacre::materials {
@@ -170,8 +173,18 @@ TEST(TreeMix, EndsAndEqualHalves) {
     EXPECT_NEAR(half.x, sum.x, 1e-9);
 }
 
-// A rough top makes what is below look rougher, a smooth one wider by its index (alpha is roughness^2), and only as
-// much as it covers.
+// A clear coat over a metal.
+FlattenedTree coated_metal(float coat_roughness, float roughness) {
+    Tree tree{.name = "coated metal"};
+    const NodeIndex metal = tree.add(Slab{.f0 = glm::vec3(0.9f), .roughness = roughness, .albedo = glm::vec3(0.0f)});
+    Slab coat{.roughness = coat_roughness, .albedo = glm::vec3(0.0f)};
+    coat.features = slab_medium;
+    coat.mean_free_path = glm::vec3(std::numeric_limits<float>::infinity());
+    tree.layer(tree.add(coat), metal);
+    return *flatten(tree);
+}
+
+// A rough top makes what is below rougher, and only as much as it covers; a smooth one leaves the roughness as it is.
 TEST(TreeLayer, RoughnessIsTracked) {
     const auto below = [](float top_roughness, float coverage) {
         Tree tree{.name = "tracked"};
@@ -183,11 +196,116 @@ TEST(TreeLayer, RoughnessIsTracked) {
         tree.layer(tree.add(coat), base);
         return shade(*flatten(tree), view_at(1.0)).closures[1].slab.roughness;
     };
-    EXPECT_NEAR(below(0.0f, 1.0f), std::sqrt(0.2 * 0.2 * 1.5), 5e-3);
+    EXPECT_NEAR(below(0.0f, 1.0f), 0.2, 1e-6);
     EXPECT_GT(below(0.6f, 1.0f), below(0.0f, 1.0f) + 0.02);
     EXPECT_GT(below(0.9f, 1.0f), below(0.6f, 1.0f));
     EXPECT_LT(below(0.6f, 0.5f), below(0.6f, 1.0f));
     EXPECT_NEAR(below(0.6f, 1e-6f), 0.2, 1e-4);
+}
+
+// Mean and spread of what leaves, in the plane of incidence (x) and across it (y).
+struct LobeShape {
+    double light = 0.0, mean = 0.0, along = 0.0, across = 0.0;
+
+    void add(const glm::dvec3& direction, double weight) {
+        light += weight;
+        mean += weight * direction.x;
+        along += weight * direction.x * direction.x;
+        across += weight * direction.y * direction.y;
+    }
+    void finish() {
+        mean /= light;
+        along = std::sqrt(along / light - mean * mean);
+        across = std::sqrt(across / light);
+    }
+};
+
+// A lobe under a coat is wider outside, wider along the plane of incidence than across it, and ends where the coat
+// reflects all: what passes the coat once, against the walk's paths that met the metal once.
+TEST(TreeLayer, LobesBelowACoatAreRefracted) {
+    closures::Lobes lobes;
+    for (const float roughness : {0.2f, 0.35f, 0.6f}) {
+        const FlattenedTree flat = coated_metal(0.0f, roughness);
+        const RandomWalk walk(flat);
+        for (const double cosine : {1.0, 0.7, 0.4}) {
+            RandomWalk::Generator random(1);
+            LobeShape walked, shaded;
+            for (int i = 0; i < 60'000; ++i) {
+                const WalkExit path = walk.walk(view_at(cosine), random);
+                if (path.ground_reflections == 1) walked.add(path.direction, path.weight.x);
+            }
+            walked.finish();
+            closures::Library::Closure once = shade(flat, view_at(cosine)).closures[1].closure;
+            once.again = closures::Library().scaled_lobe(once.again, glm::dvec3(0.0));
+            once.ring = glm::dvec3(0.0);
+            constexpr int rings = 250, sectors = 200;
+            for (int i = 0; i < rings * sectors; ++i) {
+                const double z = (i / sectors + 0.5) / rings, radius = std::sqrt(1.0 - z * z);
+                const double phi = 2.0 * lobes.pi * (i % sectors + 0.5) / sectors;
+                const glm::dvec3 light(radius * std::cos(phi), radius * std::sin(phi), z);
+                shaded.add(light, closures::Library().evaluate_closure(once, light).specular.x);
+            }
+            shaded.finish();
+            EXPECT_NEAR(shaded.mean, walked.mean, 0.01) << roughness << " at " << cosine;
+            EXPECT_NEAR(shaded.along, walked.along, 0.03 * walked.along) << roughness << " at " << cosine;
+            EXPECT_NEAR(shaded.across, walked.across, 0.03 * walked.across) << roughness << " at " << cosine;
+        }
+    }
+}
+
+// Light towards the normal by the cosine it comes at, in rings of equal steps: of the walk, and of the closures.
+struct Rings {
+    static constexpr int count = 4;
+    std::array<double, count> walked{}, shaded{};
+};
+
+Rings rings_of(const FlattenedTree& flat) {
+    closures::Lobes lobes;
+    Rings rings;
+    constexpr int paths = 300'000, steps = 4000;
+    const RandomWalk walk(flat);
+    RandomWalk::Generator random(1);
+    for (int i = 0; i < paths; ++i) {
+        const WalkExit path = walk.walk(view_at(1.0), random);
+        if (path.direction.z > 0.0)
+            rings.walked[std::min(static_cast<int>(path.direction.z * Rings::count), Rings::count - 1)] +=
+                path.weight.x / paths;
+    }
+    const ShadedTree shaded = shade(flat, view_at(1.0));
+    for (int i = 0; i < steps; ++i) {
+        const double cosine = (i + 0.5) / steps;
+        rings.shaded[i * Rings::count / steps] +=
+            2.0 * lobes.pi / steps * reflected(shaded, {std::sqrt(1.0 - cosine * cosine), 0.0, cosine}).x;
+    }
+    return rings;
+}
+
+FlattenedTree dusty(const Slab& base) {
+    Tree tree{.name = "dusty"};
+    Slab dust{.f0 = glm::vec3(0.0f), .albedo = glm::vec3(0.5f)};
+    dust.features = slab_medium;
+    dust.thickness = 1e-3f;
+    dust.mean_free_path = glm::vec3(1e-3f / 0.3f);
+    const NodeIndex ground = tree.add(base);
+    tree.layer(tree.add(dust), ground);
+    return *flatten(tree);
+}
+
+// A thin medium scatters more along the surface than Lambert's law has it (which gives the last ring seven times the
+// light of the first).
+TEST(TreeLayer, ThinMediaScatterAlongTheSurface) {
+    const Rings rings = rings_of(dusty({.f0 = glm::vec3(0.0f), .albedo = glm::vec3(0.0f)}));
+    EXPECT_LT(rings.walked[3], 3.0 * rings.walked[0]);
+    for (int i = 0; i < Rings::count; ++i)
+        EXPECT_NEAR(rings.shaded[i], rings.walked[i], 0.1 * rings.walked[i]) << i;
+}
+
+// What a lobe sends through dust goes straight or is scattered, each by its own share.
+TEST(TreeLayer, DustScattersWhatALobeSends) {
+    const Rings rings =
+        rings_of(dusty({.f0 = glm::vec3(0.9f), .roughness = 0.3f, .albedo = glm::vec3(0.0f)}));
+    for (int i = 0; i < Rings::count; ++i)
+        EXPECT_NEAR(rings.shaded[i], rings.walked[i], (i == 3 ? 0.02 : 0.15) * rings.walked[i]) << i;
 }
 
 }  // namespace

@@ -142,6 +142,27 @@ TEST(RandomWalk, AnAbsorbingPlateIsTheGeometricSeries) {
     }
 }
 
+// The same series term by term: paths know how often the mirror sent them on.
+TEST(RandomWalk, PathsCountReflectionsOfTheGround) {
+    closures::Lobes lobes;
+    constexpr double f0 = 0.7, cosine = 0.3;
+    constexpr int paths = 200'000;
+    const RandomWalk walk(layered(coat(0.0f), mirror(f0)));
+    const double below = f0 + (1.0 - f0) * lobes.power5(1.0 - inner_cosine(cosine)), above = fresnel(cosine);
+    RandomWalk::Generator random(3);
+    std::array<double, 4> sent{};
+    for (int i = 0; i < paths; ++i) {
+        const WalkExit path = walk.walk(view_at(cosine), random);
+        if (path.ground_reflections < sent.size()) sent[path.ground_reflections] += path.weight.x / paths;
+    }
+    EXPECT_NEAR(sent[0], above, 3e-3);
+    double expected = (1.0 - above) * (1.0 - above) * below;
+    for (std::size_t count = 1; count < sent.size(); ++count) {
+        EXPECT_NEAR(sent[count], expected, 3e-3) << count;
+        expected *= above * below;
+    }
+}
+
 // Diffuse matter under a smooth dielectric: Saunderson 1942.
 TEST(RandomWalk, DiffuseUnderASmoothInterfaceIsSaundersons) {
     double through = 0.0;

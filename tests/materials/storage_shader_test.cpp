@@ -47,8 +47,7 @@ void main() {
     vec3 sum = vec3(0.0);
     for (uint index = 0u; index < header.closure_count; ++index) {
         StoredClosure closure = read_stored_closure(header, index, roughness, subsurface);
-        ClosureValue value = evaluate_closure(cover_closure(prepare_closure(closure.slab, view, 1e-3), closure.path.spread,
-                                                            closure.path.under_interface), light);
+        ClosureValue value = evaluate_closure(closure_below(closure.slab, closure.path, view, 1e-3), light);
         sum += (value.specular + value.diffuse + value.subsurface) * closure.path.weight *
                top_transmittance(closure.path, light.z);
     }
@@ -113,8 +112,7 @@ class StorageShaderTest : public TreeDeviceTest {
             glm::dvec3 sum(0.0);
             for (const UnpackedClosure& closure : read->closures) {
                 const Library::ClosureValue value =
-                    library.evaluate_closure(library.cover_closure(library.prepare_closure(closure.slab, view, 1e-3), closure.path.spread,
-                                                                        closure.path.under_interface), light);
+                    library.evaluate_closure(library.closure_below(closure.slab, closure.path, view, 1e-3), light);
                 sum += (value.specular + value.diffuse + value.subsurface) * closure.path.weight *
                        library.top_transmittance(closure.path, light.z);
             }

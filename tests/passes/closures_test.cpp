@@ -97,8 +97,7 @@ TEST_P(Closures, LightingAgreesWithWhatIsStored) {
                 Library::Slab slab = stored.slab;
                 slab.roughness = std::max(slab.roughness, 0.045);
                 // 2 meters on 64 pixels.
-                const Library::Closure closure = library.cover_closure(library.prepare_closure(slab, view, 2.0 / side),
-                                                                       stored.path.spread, stored.path.under_interface);
+                const Library::Closure closure = library.closure_below(slab, stored.path, view, 2.0 / side);
                 const glm::dvec3 light = to_local * to_light;
                 const Library::ClosureValue value = library.evaluate_closure(closure, light);
                 expected += 2.0 * stored.path.weight * (value.specular + value.diffuse + value.subsurface) *
