@@ -192,9 +192,10 @@ void lobes(Report& report) {
     };
     lobe(report, "Chan over its albedo", white, 1.0, chan);
     // What is sent elsewhere counts twice: where it lacks and where it is too much. The time is that of both.
-    lobe(report, "Lambert, by directions", "Chan over its albedo", 0.0, [&](Vector view, Vector light, double roughness) {
-        return std::abs(library.lambert_diffuse(light) - chan(view, light, roughness));
-    });
+    lobe(report, "Lambert, by directions", "Chan over its albedo", 0.0,
+         [&](Vector view, Vector light, double roughness) {
+             return std::abs(library.lambert_diffuse(light) - chan(view, light, roughness));
+         });
     const std::string sheen = "albedo of the volumetric fit (Zeltner 2022)";
     lobe(report, "sheen by linearly transformed cosines", sheen, -1.0,
          [&](Vector view, Vector light, double roughness) {

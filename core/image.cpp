@@ -189,7 +189,8 @@ Expected<void> check_layers(const LayeredImage& image, const std::string& subjec
     const auto wrong = [&](std::string reason) {
         return fail(ErrorCode::invalid_argument, std::string(attempt_write), subject, std::move(reason));
     };
-    if (image.width == 0 || image.height == 0) return wrong(fmt::format("its size is {} x {}", image.width, image.height));
+    if (image.width == 0 || image.height == 0)
+        return wrong(fmt::format("its size is {} x {}", image.width, image.height));
     std::set<std::string> names;
     for (const ImageLayer& layer : image.layers) {
         for (const ImageChannel& channel : layer.channels) {

@@ -142,7 +142,8 @@ Expected<LayeredImage> read_exr_layers(std::span<const std::byte> data, std::str
 
 /// @name Conversions
 /// @{
-/// 8-bit sRGB from linear floats, exactly rounded; values outside [0, 1] are clamped, NaN becomes 0; alpha stays linear.
+/// 8-bit sRGB from linear floats, exactly rounded; values outside [0, 1] are clamped, NaN becomes 0; alpha stays
+/// linear.
 ImageBytes srgb_bytes_from_linear(const Image& image);
 /// Linear floats from 8- or 16-bit sRGB; alpha stays as it is.
 Image linear_from_srgb_bytes(const ImageBytes& image);

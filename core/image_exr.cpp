@@ -76,7 +76,8 @@ class HeaderWalk {
 
     Expected<HeaderSummary> run() {
         NACRE_TRY(const std::uint32_t version, number(4));
-        if ((version & 0xff) != 2) return damaged(format, subject_, fmt::format("version {} is unknown", version & 0xff));
+        if ((version & 0xff) != 2)
+            return damaged(format, subject_, fmt::format("version {} is unknown", version & 0xff));
         if (version & 0x800) {
             return fail(ErrorCode::unsupported, "read picture", subject_, "it is a deep picture",
                         "Flatten it to one sample for each pixel.");
@@ -172,7 +173,8 @@ class HeaderWalk {
             if (name.empty()) break;
             NACRE_TRY(const std::uint32_t type, number(position_));
             position_ += 16;
-            if (part == 0) summary.info.bits_per_channel = std::max(summary.info.bits_per_channel, type == 1 ? 16u : 32u);
+            if (part == 0)
+                summary.info.bits_per_channel = std::max(summary.info.bits_per_channel, type == 1 ? 16u : 32u);
             ++count;
         }
         if (part == 0) summary.info.channels = count;
@@ -257,12 +259,13 @@ Expected<ImageInfo> exr_info(std::span<const std::byte> data, const std::string&
 
 Expected<LayeredImage> decode_exr(std::span<const std::byte> data, const std::string& subject) {
     NACRE_TRY(const HeaderSummary summary, HeaderWalk(data, subject).run());
-    // A small file with a big claim. Pictures of one color compress by up to 65,536 (by PIZ), those that hold anything by
-    // less than 1,024 (the bound of deflate): beyond a gigabyte, a picture has to hold something.
+    // A small file with a big claim. Pictures of one color compress by up to 65,536 (by PIZ), those that hold anything
+    // by less than 1,024 (the bound of deflate): beyond a gigabyte, a picture has to hold something.
     const std::uint64_t pixels = std::uint64_t{summary.info.width} * summary.info.height;
     const double claimed_bytes = static_cast<double>(pixels) * static_cast<double>(summary.bytes_per_pixel);
     const double file_bytes = static_cast<double>(data.size());
-    if (summary.bytes_per_pixel == 0 || claimed_bytes > std::min(file_bytes * 65536, std::max(0x1p30, file_bytes * 1024))) {
+    if (summary.bytes_per_pixel == 0 ||
+        claimed_bytes > std::min(file_bytes * 65536, std::max(0x1p30, file_bytes * 1024))) {
         return damaged(format, subject, fmt::format("{} bytes cannot hold {} x {} pixels of {} bytes", data.size(),
                                                     summary.info.width, summary.info.height, summary.bytes_per_pixel));
     }
@@ -282,7 +285,8 @@ Expected<LayeredImage> decode_exr(std::span<const std::byte> data, const std::st
             return damaged(format, subject, "the header is ambiguous");
         for (int part = 0; part < file.parts(); ++part) {
             const Imf::Header& header = file.header(part);
-            const bool flat = !header.hasType() || header.type() == Imf::SCANLINEIMAGE || header.type() == Imf::TILEDIMAGE;
+            const bool flat =
+                !header.hasType() || header.type() == Imf::SCANLINEIMAGE || header.type() == Imf::TILEDIMAGE;
             if (flat && header.dataWindow() == window) read_part(file, part, image);
         }
         for (ImageLayer& layer : image.layers) sort_color_channels(layer);

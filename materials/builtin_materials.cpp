@@ -181,7 +181,8 @@ Tree block_of(const Block& block) {
 
 Tree coated_metal() {
     Tree tree;
-    const NodeIndex base = add(tree, DefaultLit{.base_color = aluminum, .metallic = 1.0f, .roughness = 0.35f, .anisotropy = 0.8f});
+    const NodeIndex base =
+        add(tree, DefaultLit{.base_color = aluminum, .metallic = 1.0f, .roughness = 0.35f, .anisotropy = 0.8f});
     add(tree, CoatedLayer{.coat_color = {0.9f, 0.25f, 0.08f}, .coat_roughness = 0.08f}, base);
     return tree;
 }

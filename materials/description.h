@@ -172,8 +172,8 @@ struct MaterialDescription {
     std::optional<Iridescence> iridescence;
     std::optional<DiffuseTransmission> diffuse_transmission;
     std::optional<SpecularGlossiness> specular_glossiness;
-    /// A tree of slabs (materials/tree.h) in place of all that shades above; emission, alpha, normals of plain slabs and
-    /// the like stay for whoever does without trees. Null: none.
+    /// A tree of slabs (materials/tree.h) in place of all that shades above; emission, alpha, normals of plain slabs
+    /// and the like stay for whoever does without trees. Null: none.
     std::shared_ptr<const Tree> tree;
     /// A material of the program's own kind (materials/custom_material.h) in place of all above. Null: none.
     std::shared_ptr<CustomMaterial> custom;

@@ -59,7 +59,8 @@ class Builder {
 
     Tree unlit() {
         color_by_vertex(
-            materials::add(tree_, Unlit{.emission = {base_color(), {.texture = material_.base_color_texture}}}), "emission");
+            materials::add(tree_, Unlit{.emission = {base_color(), {.texture = material_.base_color_texture}}}),
+            "emission");
         return std::move(tree_);
     }
 

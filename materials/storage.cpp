@@ -104,8 +104,8 @@ void for_each_closure_field(std::uint32_t index, std::uint32_t closure_count, st
         if ((features & row.feature) != 0) field(row.value);
     }
     if (medium == StoredMedium::transmittance) field(StorageValue::medium_transmittance);
-    // Coverage and mixing weigh all channels alike; only what lies under a layer is tinted. A lone closure's coverage is
-    // the pixel's.
+    // Coverage and mixing weigh all channels alike; only what lies under a layer is tinted. A lone closure's coverage
+    // is the pixel's.
     if (is_below) {
         field(StorageValue::weight);
         field(StorageValue::path_transmittance);
@@ -288,7 +288,8 @@ glm::dvec3 dither_of_color(glm::uvec2 position, std::uint32_t which) {
 
 std::uint32_t encode_number(const StorageFormat& format, std::uint32_t bits, double value, double dither) {
     switch (format.codec) {
-        case StorageCodec::unit: return library.pack_unit((value - format.low) / (format.high - format.low), bits, dither);
+        case StorageCodec::unit:
+            return library.pack_unit((value - format.low) / (format.high - format.low), bits, dither);
         case StorageCodec::signed_unit: return library.pack_signed(value, bits, dither);
         case StorageCodec::logarithm: return library.pack_logarithm(value, bits, format.low, format.octaves(), dither);
         case StorageCodec::signed_logarithm:
@@ -342,7 +343,9 @@ std::uint32_t pack_subsurface(const Library::Slab& slab, glm::uvec2 position) {
 StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, const PixelInputs& inputs) {
     StoredPixel pixel;
     pixel.words.assign(layout.material_words(), 0);
-    const auto closure_of = [&](std::uint32_t i) -> const ShadedClosure& { return shaded.closures[layout.closures[i]]; };
+    const auto closure_of = [&](std::uint32_t i) -> const ShadedClosure& {
+        return shaded.closures[layout.closures[i]];
+    };
     pixel.roughness = closure_of(0).slab.roughness;
     double seen_most = -1.0;
     for (std::uint32_t i = 0; i < layout.closures.size(); ++i) {
@@ -355,7 +358,8 @@ StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, co
     for (const StorageField& field : layout.fields) {
         const StorageFormat& format = storage_format(field.value);
         std::uint32_t code = 0;
-        const ShadedClosure* closure = field.closure == StorageLayout::no_closure ? nullptr : &closure_of(field.closure);
+        const ShadedClosure* closure =
+            field.closure == StorageLayout::no_closure ? nullptr : &closure_of(field.closure);
         const std::uint32_t at = field.closure;
         const auto next_dither = [&] { return library.ordered_dither(inputs.position.x, inputs.position.y, which++); };
         const auto color = [&](const glm::dvec3& value) {
@@ -372,7 +376,8 @@ StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, co
                 }
                 break;
             case StorageValue::occlusion_flag:
-                code = std::ranges::find(layout.fields, StorageValue::occlusion, &StorageField::value) != layout.fields.end();
+                code = std::ranges::find(layout.fields, StorageValue::occlusion, &StorageField::value) !=
+                       layout.fields.end();
                 break;
             case StorageValue::occlusion: code = encode_number(format, field.bits, inputs.occlusion, 0.5); break;
             case StorageValue::normal:
@@ -381,8 +386,9 @@ StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, co
                     static_cast<int>(field.bits / 2));
                 break;
             case StorageValue::tangent:
-                code = encode_number(format, field.bits,
-                                     field.frame < inputs.tangent_angles.size() ? inputs.tangent_angles[field.frame] : 0.0, 0.5);
+                code = encode_number(
+                    format, field.bits,
+                    field.frame < inputs.tangent_angles.size() ? inputs.tangent_angles[field.frame] : 0.0, 0.5);
                 break;
             case StorageValue::features: code = layout.features[at]; break;
             case StorageValue::medium: code = static_cast<std::uint32_t>(layout.media[at]); break;
@@ -404,9 +410,10 @@ StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, co
                 break;
             case StorageValue::specular_lut: code = closure->slab.specular_lut & 0xffu; break;
             case StorageValue::medium_transmittance:
-                color(glm::dvec3(library.medium_transmittance(closure->slab.mean_free_path.x, closure->slab.thickness),
-                                 library.medium_transmittance(closure->slab.mean_free_path.y, closure->slab.thickness),
-                                 library.medium_transmittance(closure->slab.mean_free_path.z, closure->slab.thickness)));
+                color(
+                    glm::dvec3(library.medium_transmittance(closure->slab.mean_free_path.x, closure->slab.thickness),
+                               library.medium_transmittance(closure->slab.mean_free_path.y, closure->slab.thickness),
+                               library.medium_transmittance(closure->slab.mean_free_path.z, closure->slab.thickness)));
                 break;
             case StorageValue::grey_weight:
                 code = encode_number(format, field.bits, closure->path.weight.g * closure->coverage, next_dither());
@@ -414,9 +421,10 @@ StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, co
             case StorageValue::weight: color(closure->path.weight * closure->coverage); break;
             case StorageValue::path_transmittance: color(closure->path.transmittance); break;
             case StorageValue::path_uncovered:
-                code = encode_number(format, field.bits,
-                                     (closure->path.uncovered.r + closure->path.uncovered.g + closure->path.uncovered.b) / 3.0,
-                                     next_dither());
+                code = encode_number(
+                    format, field.bits,
+                    (closure->path.uncovered.r + closure->path.uncovered.g + closure->path.uncovered.b) / 3.0,
+                    next_dither());
                 break;
             case StorageValue::path_spread:
                 code = encode_number(format, field.bits,
@@ -469,7 +477,8 @@ Expected<UnpackedMaterial> unpack_pixel(const StoredPixel& pixel) {
     const std::uint32_t closures = read(StorageValue::closure_count) + 1, frames = read(StorageValue::frame_count) + 1;
     const std::uint32_t tangents = read(StorageValue::tangent_flags, frames);
     if (read(StorageValue::occlusion_flag) != 0) {
-        material.occlusion = library.unpack_unit(read(StorageValue::occlusion), storage_format(StorageValue::occlusion).bits);
+        material.occlusion =
+            library.unpack_unit(read(StorageValue::occlusion), storage_format(StorageValue::occlusion).bits);
     }
     for (frame = 0; frame < frames; ++frame) {
         if (frame > 0) {

@@ -45,11 +45,13 @@ const char* member_of(StorageValue value) {
 }
 
 // Of a number, with its dither.
-std::string encode(const StorageFormat& format, std::uint32_t bits, const std::string& value, const std::string& dither) {
+std::string encode(const StorageFormat& format, std::uint32_t bits, const std::string& value,
+                   const std::string& dither) {
     switch (format.codec) {
         case StorageCodec::integer: return fmt::format("({} & {}u)", value, (1u << bits) - 1u);
         case StorageCodec::unit:
-            if (format.low == 0.0 && format.high == 1.0) return fmt::format("pack_unit({}, {}u, {})", value, bits, dither);
+            if (format.low == 0.0 && format.high == 1.0)
+                return fmt::format("pack_unit({}, {}u, {})", value, bits, dither);
             return fmt::format("pack_unit(({} - {}) / {}, {}u, {})", value, number(format.low),
                                number(format.high - format.low), bits, dither);
         case StorageCodec::signed_unit: return fmt::format("pack_signed({}, {}u, {})", value, bits, dither);
@@ -72,11 +74,12 @@ std::string decode(const StorageFormat& format, std::uint32_t bits, const std::s
         case StorageCodec::integer: return code;
         case StorageCodec::unit:
             if (format.low == 0.0 && format.high == 1.0) return fmt::format("unpack_unit({}, {}u)", code, bits);
-            return fmt::format("{} + {} * unpack_unit({}, {}u)", number(format.low), number(format.high - format.low), code,
-                               bits);
+            return fmt::format("{} + {} * unpack_unit({}, {}u)", number(format.low), number(format.high - format.low),
+                               code, bits);
         case StorageCodec::signed_unit: return fmt::format("unpack_signed({}, {}u)", code, bits);
         case StorageCodec::logarithm:
-            return fmt::format("unpack_logarithm({}, {}u, {}, {})", code, bits, number(format.low), number(format.octaves()));
+            return fmt::format("unpack_logarithm({}, {}u, {}, {})", code, bits, number(format.low),
+                               number(format.octaves()));
         case StorageCodec::signed_logarithm:
             return fmt::format("unpack_signed_logarithm({}, {}u, {}, {})", code, bits, number(format.low),
                                number(format.octaves()));
@@ -93,9 +96,13 @@ class Writer {
     Writer(const FlattenedTree& tree, const StorageLayout& layout) : topology_(tree.topology), layout_(layout) {}
 
     std::string run() {
-        print("#include \"materials/closures/stored_fields.glsl\"\n#include \"materials/closures/stored_frame.glsl\"\n\n");
-        print("const uint stored_words = {}u;\nconst uint stored_top_closure = {}u;\nconst uint stored_top_frame = {}u;\n\n",
-              layout_.material_words(), layout_.closures[0], layout_.frames[0]);
+        print(
+            "#include \"materials/closures/stored_fields.glsl\"\n#include "
+            "\"materials/closures/stored_frame.glsl\"\n\n");
+        print(
+            "const uint stored_words = {}u;\nconst uint stored_top_closure = {}u;\nconst uint stored_top_frame = "
+            "{}u;\n\n",
+            layout_.material_words(), layout_.closures[0], layout_.frames[0]);
         print(
             "void pack_tree(TreeState state, vec3 normals[tree_frame_count], vec3 tangents[tree_frame_count], float "
             "occlusion, uvec2 pixel, out uint words[stored_words], out uint subsurface) {{\n"
@@ -119,9 +126,12 @@ class Writer {
         for (std::uint32_t i = 0; i < layout_.closures.size(); ++i) {
             if (layout_.media[i] != StoredMedium::subsurface) continue;
             print(
-                "    {{\n        float seen = state.paths[{0}].weight.y * state.coverages[{0}];\n        if (seen > seen_most) "
-                "{{\n            seen_most = seen;\n            Slab slab = state.slabs[{0}];\n            subsurface = "
-                "pack_subsurface(slab.albedo, slab.mean_free_path, slab.phase_anisotropy, slab.thickness, pixel);\n        "
+                "    {{\n        float seen = state.paths[{0}].weight.y * state.coverages[{0}];\n        if (seen > "
+                "seen_most) "
+                "{{\n            seen_most = seen;\n            Slab slab = state.slabs[{0}];\n            subsurface "
+                "= "
+                "pack_subsurface(slab.albedo, slab.mean_free_path, slab.phase_anisotropy, slab.thickness, pixel);\n    "
+                "    "
                 "}}\n    }}\n",
                 layout_.closures[i]);
         }
@@ -154,7 +164,8 @@ class Writer {
                 }
                 return constant(flags);
             }
-            case StorageValue::occlusion_flag: return has(StorageValue::occlusion, StorageLayout::no_closure) ? "1u" : "0u";
+            case StorageValue::occlusion_flag:
+                return has(StorageValue::occlusion, StorageLayout::no_closure) ? "1u" : "0u";
             case StorageValue::occlusion: return encode(format, field.bits, "occlusion", "0.5");
             case StorageValue::normal:
                 return fmt::format("octahedral_encode(normals[{}], {})", layout_.frames[field.frame], field.bits / 2);
@@ -162,8 +173,8 @@ class Writer {
                 const std::uint32_t frame = layout_.frames[field.frame];
                 const std::string normal =
                     field.frame == 0 ? fmt::format("normals[{}]", frame)
-                                     : fmt::format("octahedral_decode(octahedral_encode(normals[{0}], {1}), {1})", frame,
-                                                   storage_format(StorageValue::normal).bits / 2);
+                                     : fmt::format("octahedral_decode(octahedral_encode(normals[{0}], {1}), {1})",
+                                                   frame, storage_format(StorageValue::normal).bits / 2);
                 return fmt::format("pack_tangent({}, tangents[{}], {}u)", normal, frame, field.bits);
             }
             case StorageValue::features: return constant(layout_.features[field.closure]);
@@ -183,9 +194,10 @@ class Writer {
                     "medium_transmittance(state.slabs[{0}].mean_free_path.z, state.slabs[{0}].thickness))",
                     closure));
             case StorageValue::grey_weight:
-                return encode(format, field.bits, fmt::format("state.paths[{0}].weight.y * state.coverages[{0}]", closure),
-                              next_dither());
-            case StorageValue::weight: return color(fmt::format("state.paths[{0}].weight * state.coverages[{0}]", closure));
+                return encode(format, field.bits,
+                              fmt::format("state.paths[{0}].weight.y * state.coverages[{0}]", closure), next_dither());
+            case StorageValue::weight:
+                return color(fmt::format("state.paths[{0}].weight * state.coverages[{0}]", closure));
             case StorageValue::path_transmittance: return color(fmt::format("state.paths[{}].transmittance", closure));
             case StorageValue::path_uncovered:
                 return encode(format, field.bits,
@@ -210,8 +222,8 @@ class Writer {
 
     void print_field(const StorageField& field) {
         const std::uint32_t word = field.offset / 32, shift = field.offset % 32;
-        print("    code = {};  // {}\n    words[{}] |= code << {}u;\n", code_of(field), storage_format(field.value).name, word,
-              shift);
+        print("    code = {};  // {}\n    words[{}] |= code << {}u;\n", code_of(field),
+              storage_format(field.value).name, word, shift);
         if (shift + field.bits > 32) print("    words[{}] |= code >> {}u;\n", word + 1, 32 - shift);
     }
 
@@ -235,7 +247,8 @@ std::string reader_text() {
     };
     const auto bits_of = [](StorageValue value) { return storage_format(value).bits; };
     const auto read = [&](StorageValue value) {
-        return decode(storage_format(value), bits_of(value), fmt::format("stored_bits(header.cursor, {}u)", bits_of(value)));
+        return decode(storage_format(value), bits_of(value),
+                      fmt::format("stored_bits(header.cursor, {}u)", bits_of(value)));
     };
     print(R"(
 struct StoredHeader {{
@@ -305,8 +318,8 @@ StoredClosure read_stored_closure(inout StoredHeader header, uint index, float t
           bits_of(StorageValue::occlusion_flag), read(StorageValue::occlusion), bits_of(StorageValue::normal),
           bits_of(StorageValue::normal) / 2, bits_of(StorageValue::tangent), bits_of(StorageValue::tangent),
           bits_of(StorageValue::features), bits_of(StorageValue::medium), bits_of(StorageValue::has_albedo),
-          bits_of(StorageValue::is_below), bits_of(StorageValue::frame), read(StorageValue::f0), read(StorageValue::albedo),
-          read(StorageValue::roughness));
+          bits_of(StorageValue::is_below), bits_of(StorageValue::frame), read(StorageValue::f0),
+          read(StorageValue::albedo), read(StorageValue::roughness));
     std::uint32_t open = 0;
     for (const StoredFeatureValue& row : stored_feature_values()) {
         if (row.feature != open) {
@@ -360,7 +373,9 @@ StoredClosure read_stored_closure(inout StoredHeader header, uint index, float t
 
 }  // namespace
 
-std::string storage_writer(const FlattenedTree& tree, const StorageLayout& layout) { return Writer(tree, layout).run(); }
+std::string storage_writer(const FlattenedTree& tree, const StorageLayout& layout) {
+    return Writer(tree, layout).run();
+}
 
 std::span<const EmbeddedFile> storage_reader_files() {
     static const std::string text = reader_text();

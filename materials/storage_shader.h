@@ -20,7 +20,8 @@ namespace nacre::materials {
 /// GLSL that follows tree_shader()'s of the same tree and offers
 ///
 ///     const uint stored_words, stored_top_closure, stored_top_frame;
-///     void pack_tree(TreeState state, vec3 normals[tree_frame_count], vec3 tangents[tree_frame_count], float occlusion,
+///     void pack_tree(TreeState state, vec3 normals[tree_frame_count], vec3 tangents[tree_frame_count], float
+///     occlusion,
 ///                    uvec2 pixel, out uint words[stored_words], out uint subsurface);
 ///
 /// normals and tangents: unit, in any common space, in the order of Topology::frames; the normal of stored_top_frame is

@@ -73,8 +73,8 @@ struct Node {
     bool parameter_blend = false;  ///< Mix and layer: always simplified to one slab, whatever the budget.
 
     std::vector<TextureInput> textures;  ///< At most one for each input.
-    /// Inputs that the color of the vertex multiplies: colors of a slab by its rgb, "amount" by its alpha. White where a
-    /// mesh has none.
+    /// Inputs that the color of the vertex multiplies: colors of a slab by its rgb, "amount" by its alpha. White where
+    /// a mesh has none.
     std::vector<std::string> vertex_colored;
 
     /// Whether an input is more than its number: a texture or the vertex's color multiplies it.

@@ -192,9 +192,9 @@ class Reader {
             if (value.contains("texture")) {
                 const json& texture = value["texture"];
                 const std::string at = place + ".texture";
-                NACRE_CHECK(
-                    members(texture, at,
-                            {"image", "uv_set", "uv_offset", "uv_scale", "uv_rotation", "channel", "scale", "bias", "gray"}));
+                NACRE_CHECK(members(
+                    texture, at,
+                    {"image", "uv_set", "uv_offset", "uv_scale", "uv_rotation", "channel", "scale", "bias", "gray"}));
                 TextureInput read{.field = std::string(field)};
                 NACRE_CHECK(reference(texture, at, read.texture));
                 if (texture.contains("channel")) {

@@ -70,8 +70,8 @@ class Printer {
     std::string texture_factor(NodeIndex node, std::string_view field, std::uint32_t channels) {
         const auto& colored = tree_.visible_tree.nodes[node].vertex_colored;
         const std::string by_vertex = std::ranges::find(colored, field) == colored.end() ? ""
-                                      : channels == 3                                    ? " * NACRE_TREE_VERTEX_COLOR.xyz"
-                                                                                         : " * NACRE_TREE_VERTEX_COLOR.w";
+                                      : channels == 3 ? " * NACRE_TREE_VERTEX_COLOR.xyz"
+                                                      : " * NACRE_TREE_VERTEX_COLOR.w";
         const TextureInput* input = texture_of(node, field);
         if (input == nullptr) return by_vertex;
         result_.textures.push_back({.node = node, .input = *input});
@@ -200,13 +200,14 @@ class Printer {
                     break;
                 case StepKind::slab_matter:
                     print(
-                        "    Matter matter_{0} = slab_matter(slab_{1}, prepare_closure(slab_{1}, view_below(views[{2}], "
+                        "    Matter matter_{0} = slab_matter(slab_{1}, prepare_closure(slab_{1}, "
+                        "view_below(views[{2}], "
                         "widening_{3}), footprint));\n",
                         step.result, step.a, slots[step.a], step.b);
                     break;
                 case StepKind::base_matter:
-                    print("    Matter matter_{} = base_matter(slab_{}, view_below(views[{}], widening_{}).z);\n", step.result,
-                          step.a, slots[step.a], step.b);
+                    print("    Matter matter_{} = base_matter(slab_{}, view_below(views[{}], widening_{}).z);\n",
+                          step.result, step.a, slots[step.a], step.b);
                     break;
                 case StepKind::cover_matter:
                     print("    Matter matter_{} = cover_matter(matter_{}, {});\n", step.result, step.a, amount);
@@ -234,7 +235,8 @@ class Printer {
             print(
                 "    state.slabs[{0}] = slab_{1};\n    state.slabs[{0}].features = {4}u;\n    state.paths[{0}] = "
                 "path_{2};\n"
-                "    state.coverages[{0}] = slab_coverage(slab_{1}, refracted_direction(views[{3}], path_{2}.ior_excess).z);\n",
+                "    state.coverages[{0}] = slab_coverage(slab_{1}, refracted_direction(views[{3}], "
+                "path_{2}.ior_excess).z);\n",
                 i, closure.slab, closure.path, frame_slot(closure.frame), closure.features);
         }
         print("    return state;\n}}\n");

@@ -10,8 +10,8 @@
 
 namespace nacre::materials {
 
-/// A direction of the surface's frame in a frame that is turned by `angle` (radians) around the normal; by -angle the way
-/// back.
+/// A direction of the surface's frame in a frame that is turned by `angle` (radians) around the normal; by -angle the
+/// way back.
 [[nodiscard]] inline glm::dvec3 turned(const glm::dvec3& direction, double angle) {
     if (angle == 0.0) return direction;
     const double c = std::cos(angle), s = std::sin(angle);

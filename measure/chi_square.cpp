@@ -63,7 +63,8 @@ void ChiSquareTest::measure(Cell& cell) {
         for (int j = 0; j < 3; ++j) {
             const double angle = from + length * std::lerp(cell.part[0], cell.part[1], nodes[j]);
             const double sine = std::sin(angle);
-            values[i][j] = length > 0.0 ? length * sine * density_(sine * outwards + std::cos(angle) * frame_.axis) : 0.0;
+            values[i][j] =
+                length > 0.0 ? length * sine * density_(sine * outwards + std::cos(angle) * frame_.axis) : 0.0;
             cell.sum += weights[i] * weights[j] * values[i][j];
         }
     }
@@ -97,9 +98,10 @@ double ChiSquareTest::refined(const Cell& cell, double tolerance, int depth) {
     double result = 0.0;
     for (int i = 0; i < 2; ++i) {
         const double by_halves = four[i][0].sum + four[i][1].sum;
-        result += depth > 0 && std::abs(by_halves - two[i].sum) > below
-                      ? refined(four[i][0], 0.5 * tolerance, depth - 1) + refined(four[i][1], 0.5 * tolerance, depth - 1)
-                      : by_halves;
+        result +=
+            depth > 0 && std::abs(by_halves - two[i].sum) > below
+                ? refined(four[i][0], 0.5 * tolerance, depth - 1) + refined(four[i][1], 0.5 * tolerance, depth - 1)
+                : by_halves;
     }
     return result;
 }
@@ -116,7 +118,8 @@ double ChiSquareTest::integral(int ring, int sector, int parts) {
     const double angles[2] = {angle_at(ring), angle_at(ring + 1)};
     std::array<double, 6> marks;
     int count = 0;
-    const double from = 2.0 * std::numbers::pi * sector / sectors_, to = 2.0 * std::numbers::pi * (sector + 1) / sectors_;
+    const double from = 2.0 * std::numbers::pi * sector / sectors_,
+                 to = 2.0 * std::numbers::pi * (sector + 1) / sectors_;
     marks[count++] = from;
     // Where the surface enters and leaves the bin.
     const double tilt = std::hypot(frame_.right.z, frame_.up.z), lowest = std::atan2(frame_.up.z, frame_.right.z);

@@ -32,7 +32,8 @@ struct DirectionBins {
 /// One test. Not for several threads at once.
 class ChiSquareTest {
   public:
-    /// @param density  per solid angle, at most 1 in total; smooth but where it may end, at the surface (z = 0). What it
+    /// @param density  per solid angle, at most 1 in total; smooth but where it may end, at the surface (z = 0). What
+    /// it
     ///                 refers to must outlive the test.
     ChiSquareTest(const DirectionBins& bins, std::function<double(const glm::dvec3&)> density);
 
@@ -41,8 +42,8 @@ class ChiSquareTest {
     /// A sample of what the density leaves to 1.
     void add_lost() { ++lost_; }
 
-    /// Smallest probability, over four sizes of bins, that honest samples look as unlike the density as these. The first
-    /// call after a sample integrates the density over the bins, as exactly as the number of samples asks for.
+    /// Smallest probability, over four sizes of bins, that honest samples look as unlike the density as these. The
+    /// first call after a sample integrates the density over the bins, as exactly as the number of samples asks for.
     /// `scale`: what the density is wrong by. A significance of s over n tests is a limit of 1 - (1 - s)^(1 / (4 n)).
     [[nodiscard]] double smallest_probability(double scale = 1.0);
 

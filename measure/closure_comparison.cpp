@@ -42,7 +42,8 @@ struct Step {
 
 Step part(std::uint32_t a, std::uint32_t b, std::uint32_t shift, std::uint32_t bits) {
     const std::uint32_t mask = (1u << bits) - 1u;
-    const auto codes = std::abs(static_cast<std::int64_t>(a >> shift & mask) - static_cast<std::int64_t>(b >> shift & mask));
+    const auto codes =
+        std::abs(static_cast<std::int64_t>(a >> shift & mask) - static_cast<std::int64_t>(b >> shift & mask));
     return {codes, static_cast<double>(codes) / mask};
 }
 
@@ -215,7 +216,8 @@ Expected<ClosureDifference> compare_closures(const MaterialWords& reference, con
         } else {
             for (std::size_t f = 0; f < material_a->fields.size(); ++f) {
                 const StorageFormat& format = materials::storage_format(material_a->fields[f].value);
-                note(format.name, step_of(format, material_a->fields[f].bits, material_a->codes[f], material_b->codes[f]));
+                note(format.name,
+                     step_of(format, material_a->fields[f].bits, material_a->codes[f], material_b->codes[f]));
             }
             if (has_subsurface(*material_a)) {
                 for (std::uint32_t shift = 0; shift < 32; shift += 8) {

@@ -34,9 +34,9 @@ Expected<ClosureDifference> compare_closures(const MaterialWords& reference, con
 
 /// What single precision does to stored closures: for each kind of field that holds numbers one NumericalError of
 /// texture "material.slices", whose largest error has the name of the field ("f0.g"), the decoded values, and for
-/// `stored` the word in which the field begins. Pixels whose topologies differ show another surface: they count as flips
-/// of the first of the errors. Errors are in the field's unit, radians for normals and tangents, and of what goes round
-/// the shorter way. Error: invalid_argument (sizes differ).
+/// `stored` the word in which the field begins. Pixels whose topologies differ show another surface: they count as
+/// flips of the first of the errors. Errors are in the field's unit, radians for normals and tangents, and of what goes
+/// round the shorter way. Error: invalid_argument (sizes differ).
 Expected<std::vector<NumericalError>> closure_errors(const MaterialWords& reference, const MaterialWords& test);
 
 }  // namespace nacre::measure

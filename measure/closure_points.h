@@ -73,7 +73,8 @@ inline glm::dvec3 integrate(Library& library, const Library::Closure& closure, i
     lobes[3].second_probability = 1.0;
     lobes[4].transmission = closure.transmission;
     lobes[4].transmission_probability = 1.0;
-    const bool present[] = {true, true, (closure.features & materials::slab_fuzz) != 0, (closure.features & materials::slab_second_lobe) != 0,
+    const bool present[] = {true, true, (closure.features & materials::slab_fuzz) != 0,
+                            (closure.features & materials::slab_second_lobe) != 0,
                             (closure.features & materials::slab_medium) != 0};
     glm::dvec3 sum(0.0);
     for (std::size_t lobe = 0; lobe < lobes.size(); ++lobe) {

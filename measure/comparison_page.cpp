@@ -20,22 +20,26 @@ ReportCell number_cell(std::string text, ReportTone tone = ReportTone::plain) {
 std::string percent(double share) { return share == 0.0 ? "0 %" : fmt::format("{:.3g} %", 100.0 * share); }
 
 ReportTable backend_table(const SceneComparison& comparison) {
-    ReportTable table{.title = "Backends",
-                      .note = fmt::format("Differences are to {}. 200 dB means equal in every bit; FLIP is what a person "
-                                          "sees when flipping between two pictures, 0 to 1.",
-                                          comparison.backends.front().backend),
-                      .columns = {"backend", "device", "ms per frame", "fastest", "slowest", "memory", "PSNR", "FLIP mean",
-                                  "largest byte difference", "pixels above 1/255"}};
+    ReportTable table{
+        .title = "Backends",
+        .note = fmt::format("Differences are to {}. 200 dB means equal in every bit; FLIP is what a person "
+                            "sees when flipping between two pictures, 0 to 1.",
+                            comparison.backends.front().backend),
+        .columns = {"backend", "device", "ms per frame", "fastest", "slowest", "memory", "PSNR", "FLIP mean",
+                    "largest byte difference", "pixels above 1/255"}};
     double slowest = 1e-9;
     for (const BackendResult& result : comparison.backends) slowest = std::max(slowest, result.times.median_ms);
     for (const BackendResult& result : comparison.backends) {
         const bool is_reference = &result == &comparison.backends.front();
         ReportCell time = number_cell(fmt::format("{:.2f}", result.times.median_ms));
         time.bar = result.times.median_ms / slowest;
-        std::vector<ReportCell> row = {text_cell(result.backend), text_cell(result.device), time,
-                                       number_cell(fmt::format("{:.2f}", result.times.min_ms)),
-                                       number_cell(fmt::format("{:.2f}", result.times.max_ms)),
-                                       number_cell(fmt::format("{:.1f} MiB", double(result.times.memory_bytes) / 1048576.0))};
+        std::vector<ReportCell> row = {
+            text_cell(result.backend),
+            text_cell(result.device),
+            time,
+            number_cell(fmt::format("{:.2f}", result.times.min_ms)),
+            number_cell(fmt::format("{:.2f}", result.times.max_ms)),
+            number_cell(fmt::format("{:.1f} MiB", double(result.times.memory_bytes) / 1048576.0))};
         if (is_reference) {
             for (int i = 0; i < 4; ++i) row.push_back(number_cell(i == 0 ? "reference" : ""));
         } else {
@@ -81,7 +85,8 @@ ReportTable texture_table(const BackendResult& result, const std::string& refere
         .is_folded = false};
     for (const TextureDifference& texture : result.textures) {
         const auto share = [&](std::uint64_t count) {
-            return fmt::format("{} ({})", count, percent(texture.texels ? double(count) / double(texture.texels) : 0.0));
+            return fmt::format("{} ({})", count,
+                               percent(texture.texels ? double(count) / double(texture.texels) : 0.0));
         };
         std::vector<std::string> fields;
         for (const FieldDifference& field : texture.fields) {
@@ -142,9 +147,11 @@ ReportTable narrowed_table(const SceneComparison& comparison) {
 ReportGallery difference_gallery(const SceneComparison& comparison, const std::vector<PairDifference>& pairs,
                                  Expected<void>& status) {
     constexpr float gain = 32.0f;
-    ReportGallery gallery{.title = "Differences",
-                          .note = fmt::format("For each pair: the difference of the bytes times {}, and the FLIP map (black: "
-                                              "no difference seen).", gain)};
+    ReportGallery gallery{
+        .title = "Differences",
+        .note = fmt::format("For each pair: the difference of the bytes times {}, and the FLIP map (black: "
+                            "no difference seen).",
+                            gain)};
     for (const PairDifference& pair : pairs) {
         const BackendResult& a = comparison.backends[pair.a];
         const BackendResult& b = comparison.backends[pair.b];
@@ -159,7 +166,8 @@ ReportGallery difference_gallery(const SceneComparison& comparison, const std::v
                                     fmt::format("{:.1f} dB, largest byte difference {}", pair.difference.psnr_db,
                                                 pair.difference.max_abs_8bit),
                                     srgb_bytes_from_linear(*image)});
-        gallery.pictures.push_back({fmt::format("{}: FLIP", name), fmt::format("mean {:.2g}", pair.difference.flip_mean),
+        gallery.pictures.push_back({fmt::format("{}: FLIP", name),
+                                    fmt::format("mean {:.2g}", pair.difference.flip_mean),
                                     srgb_bytes_from_linear(colored_flip_map(pair.difference.flip_map))});
     }
     return gallery;

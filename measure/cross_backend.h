@@ -56,8 +56,8 @@ struct BackendResult {
     std::vector<std::string> added;            ///< Textures that the reference lacks.
     PictureDifference final;
     /// Where the reference is in double precision (Capabilities::float_bits) and this backend is not: of every texture
-    /// of numbers in `textures` (of stored closures, "material.slices", of every kind of field), and where the largest of
-    /// them begins.
+    /// of numbers in `textures` (of stored closures, "material.slices", of every kind of field), and where the largest
+    /// of them begins.
     std::vector<NumericalError> errors;
     std::optional<ErrorOrigin> origin;
     std::string origin_of;  ///< The texture whose error that is: the largest that can be traced.

@@ -115,7 +115,8 @@ float sum(const Kernel& kernel) {
     return static_cast<float>(total);
 }
 
-// --- Contrast sensitivity ---------------------------------------------------------------------------------------------
+// --- Contrast sensitivity
+// ---------------------------------------------------------------------------------------------
 
 // The eye's response to a frequency, as a sum of Gaussians a * sqrt(pi / b) * exp(-pi^2 x^2 / b), x in degrees
 // (table 1 of the paper).
@@ -160,7 +161,8 @@ Plane filter_sensitivity(const Plane& source, const Sensitivity& s, float pixels
     return result;
 }
 
-// --- Features ---------------------------------------------------------------------------------------------------------
+// --- Features
+// ---------------------------------------------------------------------------------------------------------
 
 constexpr float feature_width_degrees = 0.082f;
 

@@ -126,7 +126,8 @@ Expected<void> PointShader::run(std::span<const std::uint32_t> points, std::span
     list.set_bind_group(0, group_);
     list.dispatch({(count + 63) / 64, 1, 1});
     NACRE_CHECK(device_->submit(std::move(list)));
-    NACRE_TRY(const std::vector<std::byte> bytes, device_->read_buffer(results_, 0, std::uint64_t{4} * desc_.result_words * count));
+    NACRE_TRY(const std::vector<std::byte> bytes,
+              device_->read_buffer(results_, 0, std::uint64_t{4} * desc_.result_words * count));
     results.resize(static_cast<std::size_t>(count) * desc_.result_words);
     std::memcpy(results.data(), bytes.data(), results.size() * sizeof(float));
     return {};

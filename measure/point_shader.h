@@ -47,8 +47,8 @@ class PointShader {
     /// Errors: shader_compile, and those of making buffers and pipelines.
     static Expected<PointShader> make(rhi::Device& device, const PointShaderDesc& desc);
 
-    /// `count` invocations, rounded up to whole workgroups. `candidates` and `parameters` are read where the shader asks
-    /// for them. `results` is resized. Waits for the device.
+    /// `count` invocations, rounded up to whole workgroups. `candidates` and `parameters` are read where the shader
+    /// asks for them. `results` is resized. Waits for the device.
     Expected<void> run(std::span<const std::uint32_t> points, std::span<const float> candidates,
                        std::span<const float> parameters, std::uint32_t count, std::vector<float>& results);
 

@@ -103,17 +103,19 @@ std::string bars_svg(const ReportPlot& plot) {
         const ReportPlot::Bar& bar = plot.bars[i];
         const double from = left + width * place_on(plot, bar.low), to = left + width * place_on(plot, bar.high);
         const double y = row * static_cast<double>(i);
-        svg += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text><rect class=\"{}\" x=\"{:.1f}\" "
-                           "y=\"{}\" width=\"{:.1f}\" height=\"12\" rx=\"2\"><title>{}: {:.6g} to {:.6g}</title></rect>",
-                           left - 10.0, y + 14.0, escaped(bar.name), class_of(bar.tone), from, y + 4.0,
-                           std::max(to - from, 2.0), escaped(bar.name), bar.low, bar.high);
+        svg += fmt::format(
+            "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text><rect class=\"{}\" x=\"{:.1f}\" "
+            "y=\"{}\" width=\"{:.1f}\" height=\"12\" rx=\"2\"><title>{}: {:.6g} to {:.6g}</title></rect>",
+            left - 10.0, y + 14.0, escaped(bar.name), class_of(bar.tone), from, y + 4.0, std::max(to - from, 2.0),
+            escaped(bar.name), bar.low, bar.high);
     }
     return svg + "</svg>\n";
 }
 
 std::string lines_svg(const ReportPlot& plot) {
     constexpr double left = 60.0, width = 700.0, height = 300.0, top = 10.0;
-    constexpr const char* colors[] = {"#7cc4ff", "#ff7b72", "#6bd68c", "#e3b341", "#d2a8ff", "#79e2d0", "#ffa657", "#f7a8c4"};
+    constexpr const char* colors[] = {"#7cc4ff", "#ff7b72", "#6bd68c", "#e3b341",
+                                      "#d2a8ff", "#79e2d0", "#ffa657", "#f7a8c4"};
     std::string svg = fmt::format("<svg class=\"plot\" viewBox=\"0 0 {} {}\" role=\"img\">", left + width + 240.0,
                                   height + top + 30.0);
     for (const double mark : plot.marks) {
@@ -132,7 +134,8 @@ std::string lines_svg(const ReportPlot& plot) {
         const char* const color = colors[l % std::size(colors)];
         std::string points;
         for (std::size_t c = 0; c < plot.lines[l].values.size(); ++c)
-            points += fmt::format("{:.1f},{:.1f} ", x_of(c), top + height * (1.0 - place_on(plot, plot.lines[l].values[c])));
+            points +=
+                fmt::format("{:.1f},{:.1f} ", x_of(c), top + height * (1.0 - place_on(plot, plot.lines[l].values[c])));
         svg += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"/><text x=\"{}\" "
                            "y=\"{}\" style=\"fill:{}\">{}</text>",
                            points, color, left + width + 12.0, top + 14.0 + 18.0 * static_cast<double>(l), color,

@@ -79,7 +79,8 @@ struct ReportPage {
     std::vector<ReportTable> tables;     ///< Before the pictures.
     std::vector<ReportPlot> plots;       ///< After the tables.
     std::vector<ReportPicture> pictures; ///< Side by side, and in the viewer.
-    std::vector<ReportGallery> galleries;///< Further pictures; also in the viewer where they have the size of the first.
+    std::vector<ReportGallery>
+        galleries;  ///< Further pictures; also in the viewer where they have the size of the first.
     std::vector<ReportTable> details;    ///< After the pictures.
 };
 

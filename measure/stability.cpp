@@ -136,7 +136,8 @@ StabilityFigures judge(const StabilitySubject& subject, const Batch& batch) {
             largest = std::max(largest, error);
             worst.add(error, i, k, value, exact[k]);
         }
-        const int angle = decade_bin(subject.lower_cosine(words), -StabilityFigures::angle_bins, StabilityFigures::angle_bins);
+        const int angle =
+            decade_bin(subject.lower_cosine(words), -StabilityFigures::angle_bins, StabilityFigures::angle_bins);
         figures.error_by_angle[angle] = std::max(figures.error_by_angle[angle], largest);
         if (subject.on_host && !subject.is_judged_by_host && i % 64 == 17) {
             std::ranges::fill(closed, std::numeric_limits<double>::quiet_NaN());
@@ -243,7 +244,8 @@ Expected<void> measure_furnaces(const StabilitySubject& subject, bool is_short, 
 
 // One slab and view whose samples are tested, and what they are tested with.
 struct SamplerTest {
-    SamplerTest(const SamplingCase& sampling, bool is_short) : view(glm::vec3(direction(sampling.cosine, sampling.azimuth))) {
+    SamplerTest(const SamplingCase& sampling, bool is_short)
+        : view(glm::vec3(direction(sampling.cosine, sampling.azimuth))) {
         Library library;
         library.tints = stability_tint;
         const auto closure = library.prepare_closure(Library::slab_of(sampling.slab), view, 1e-3f);
@@ -316,8 +318,9 @@ Expected<void> test_samplers(rhi::Device& device, const StabilitySubject& subjec
         if (test.probability_of_wrong >= limit) ++row.chi2_blind;
         if (test.probability < row.chi2_probability) {
             row.chi2_probability = test.probability;
-            row.chi2_at = fmt::format("roughness {:.3g}, anisotropy {:.3g}, view cosine {:.3g}: {:.2g}",
-                                      sampling.slab.roughness, sampling.slab.anisotropy, sampling.cosine, test.probability);
+            row.chi2_at =
+                fmt::format("roughness {:.3g}, anisotropy {:.3g}, view cosine {:.3g}: {:.2g}", sampling.slab.roughness,
+                            sampling.slab.anisotropy, sampling.cosine, test.probability);
         }
     }
     return {};
@@ -434,8 +437,8 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
         tests += tests_of(subject);
         if (is_asked_for(subject)) shares += subject.share, ++wanted;
     }
-    // Significance 0.01 over all tests together (Sidak), four sizes of bins in each. Over those that are not asked for as
-    // well: a part of the sweep that is run again has the same samples and the same limit.
+    // Significance 0.01 over all tests together (Sidak), four sizes of bins in each. Over those that are not asked for
+    // as well: a part of the sweep that is run again has the same samples and the same limit.
     const double limit = 1.0 - std::pow(0.99, 1.0 / (4.0 * static_cast<double>(std::max<std::size_t>(tests, 1))));
 
     Progress progress("measuring closures", wanted);
@@ -462,7 +465,8 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
             // At least one batch: what is smaller costs no less.
             const auto points = static_cast<std::uint64_t>(
                 std::ceil(static_cast<double>(d == 0 ? desc.points : desc.points / 10) * subject.share / shares));
-            NACRE_TRY(const StabilityFigures figures, measure_subject(*devices[d], **reference, subject, points, 1000 * s + d));
+            NACRE_TRY(const StabilityFigures figures,
+                      measure_subject(*devices[d], **reference, subject, points, 1000 * s + d));
             row->devices[d].add(figures);
             row->all.add(figures);
         }
@@ -496,7 +500,8 @@ std::vector<std::string> violations_of(const StabilityReport& report) {
         // Fewer samples cannot tell a percent where most of them are lost below the surface.
         if (c.chi2_blind > 0 && report.samples >= 1'000'000)
             add(c, fmt::format("{} of {} tests would not see a density wrong by 1 %", c.chi2_blind, c.chi2_tests));
-        if (c.chi2_failures > 0) add(c, fmt::format("{} of {} samplers do not draw their density", c.chi2_failures, c.chi2_tests));
+        if (c.chi2_failures > 0)
+            add(c, fmt::format("{} of {} samplers do not draw their density", c.chi2_failures, c.chi2_tests));
     }
     return violations;
 }

@@ -17,8 +17,8 @@
 /// edges over-represented, against the same text in double precision and against closed forms; energy, reciprocity, and
 /// whether samplers draw what they claim.
 ///
-///     NACRE_TRY(const StabilityReport report, measure_stability(instance, {.backends = {"cpu"}, .points = 1'000'000}));
-///     for (const std::string& violation : violations_of(report)) ...
+///     NACRE_TRY(const StabilityReport report, measure_stability(instance, {.backends = {"cpu"}, .points =
+///     1'000'000})); for (const std::string& violation : violations_of(report)) ...
 ///
 /// docs/stability.md says what each figure means.
 

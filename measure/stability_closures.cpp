@@ -43,7 +43,8 @@ std::string describe_closure(const std::uint32_t* words) {
                             s.mean_free_path.x, s.mean_free_path.y, s.mean_free_path.z, s.thickness,
                             s.phase_anisotropy);
     if (has(slab_edge_coverage))
-        text += fmt::format(", coverage {:.7g} to {:.7g} exponent {:.7g}", s.coverage, s.edge_coverage, s.edge_exponent);
+        text +=
+            fmt::format(", coverage {:.7g} to {:.7g} exponent {:.7g}", s.coverage, s.edge_coverage, s.edge_exponent);
     return text + fmt::format("; view {:.9g} {:.9g} {:.9g}, light {:.9g} {:.9g} {:.9g}, random {:.9g} {:.9g} {:.9g}",
                               p.view.x, p.view.y, p.view.z, p.light.x, p.light.y, p.light.z, p.random.x, p.random.y,
                               p.random.z);
@@ -86,7 +87,9 @@ StabilitySubject closure_subject(std::string name, std::string what, std::uint32
         // The ends of the range of random numbers as well.
         const auto unit = [&] {
             const double kind = random();
-            return kind < 0.02 ? 0.0f : kind < 0.04 ? 1.0f - 0x1p-24f : std::floor(static_cast<float>(random() * 0x1p24)) * 0x1p-24f;
+            return kind < 0.02   ? 0.0f
+                   : kind < 0.04 ? 1.0f - 0x1p-24f
+                                 : std::floor(static_cast<float>(random() * 0x1p24)) * 0x1p-24f;
         };
         point.random = {unit(), unit(), unit()};
         point.random = glm::min(point.random, glm::vec3(1.0f - 0x1p-24f));
@@ -103,7 +106,9 @@ StabilitySubject closure_subject(std::string name, std::string what, std::uint32
         const auto closure = library.prepare_closure(slab, p.view, p.footprint);
         const auto value = library.evaluate_closure(closure, p.light);
         const auto albedo = library.closure_albedo(closure);
-        const auto put = [&](int at, const glm::dvec3& v) { values[at] = v.x, values[at + 1] = v.y, values[at + 2] = v.z; };
+        const auto put = [&](int at, const glm::dvec3& v) {
+            values[at] = v.x, values[at + 1] = v.y, values[at + 2] = v.z;
+        };
         put(0, value.specular);
         put(3, value.diffuse + value.subsurface);
         put(6, albedo.specular + albedo.fuzz);
@@ -205,8 +210,9 @@ std::vector<StabilitySubject> closure_subjects() {
     }
     {
         auto& s = add(closure_subject("anisotropy", "Stretched GGX.", slab_anisotropy));
-        s.note = "Compensation comes from a table of 63 KiB in four inputs, whose interpolation is off by up to 0.0025 for "
-                 "metals: more than the 0.001 and 0.002 that are promised elsewhere.";
+        s.note =
+            "Compensation comes from a table of 63 KiB in four inputs, whose interpolation is off by up to 0.0025 for "
+            "metals: more than the 0.001 and 0.002 that are promised elsewhere.";
         s.limits.furnace = 1.0016;
         s.limits.lossless = 0.997;
         add_furnaces(s, white_metal, true, {-0.9f, 0.3f, 0.95f, 1.0f});
@@ -220,7 +226,8 @@ std::vector<StabilitySubject> closure_subjects() {
         add_samplings(s, slab, {0.3f});
     }
     {
-        auto& s = add(closure_subject("f82", "The dip at 82 degrees, with and without a tint.", slab_f82, {}, slab_f90));
+        auto& s =
+            add(closure_subject("f82", "The dip at 82 degrees, with and without a tint.", slab_f82, {}, slab_f90));
         Slab slab{.f0 = {0.9f, 0.5f, 0.2f}, .f90 = {0.2f, 1.0f, 0.6f}, .f82 = {0.3f, 0.0f, 1.0f}};
         add_furnaces(s, slab, true);
         add_samplings(s, slab, {0.3f});
@@ -301,7 +308,8 @@ std::vector<StabilitySubject> closure_subjects() {
             if (is_opaque && random() < 0.1) slab.mean_free_path = glm::vec3(random() < 0.5 ? 0.0f : 1e-40f);
             if (is_empty && random() < 0.1) slab.mean_free_path = glm::vec3(std::numeric_limits<float>::infinity());
             if (is_empty && random() < 0.1) slab.thickness = random() < 0.5 ? 0.0f : 1e-40f;
-            if (regime.low > 0.0 && regime.low < 1.0 && random() < 0.3) slab.thickness = std::numeric_limits<float>::infinity();
+            if (regime.low > 0.0 && regime.low < 1.0 && random() < 0.3)
+                slab.thickness = std::numeric_limits<float>::infinity();
         }));
         for (const double depth : {regime.low, 0.5 * (regime.low + regime.high), regime.high}) {
             for (const float phase : {0.0f, 0.8f, -0.8f}) {

@@ -73,10 +73,11 @@ void make_lobe_point(Random& random, std::uint32_t* words) {
 std::string describe_lobe(const std::uint32_t* words) {
     const LobePoint p = point_of<LobePoint>(words);
     return fmt::format(
-        "roughness {:.9g}, anisotropy {:.9g}, color {:.9g} {:.9g} {:.9g}, random {:.9g} {:.9g}, mean free path {:.9g} m, "
+        "roughness {:.9g}, anisotropy {:.9g}, color {:.9g} {:.9g} {:.9g}, random {:.9g} {:.9g}, mean free path {:.9g} "
+        "m, "
         "length {:.9g} m; view {:.9g} {:.9g} {:.9g}, light {:.9g} {:.9g} {:.9g}",
-        p.roughness, p.anisotropy, p.color.x, p.color.y, p.color.z, p.random.x, p.random.y, p.mean_free_path, p.distance,
-        p.view.x, p.view.y, p.view.z, p.light.x, p.light.y, p.light.z);
+        p.roughness, p.anisotropy, p.color.x, p.color.y, p.color.z, p.random.x, p.random.y, p.mean_free_path,
+        p.distance, p.view.x, p.view.y, p.view.z, p.light.x, p.light.y, p.light.z);
 }
 
 // `body`: statements of `void evaluate(LobePoint p)` that put one number for each of `results`.
@@ -114,7 +115,8 @@ std::function<Expected<std::pair<double, double>>(bool)> furnace_of(const Lobe& 
                 double sum = 0.0;
                 for (int i = 0; i < rings; ++i) {
                     // Rings crowd along the surface and around the normal.
-                    const double s = (i + 0.5) / rings, z = s * s * (3.0 - 2.0 * s), width = 6.0 * s * (1.0 - s) / rings;
+                    const double s = (i + 0.5) / rings, z = s * s * (3.0 - 2.0 * s),
+                                 width = 6.0 * s * (1.0 - s) / rings;
                     for (int j = 0; j < rings; ++j) {
                         // Azimuths crowd around the plane of the view, of which one half counts for both.
                         const double t = (j + 0.5) / rings, phi = std::numbers::pi * t * t * (3.0 - 2.0 * t);
@@ -189,7 +191,8 @@ std::vector<StabilitySubject> lobe_subjects() {
             const glm::dvec3 v = p.view, l = p.light, sum = v + l;
             const glm::dvec3 h = sum / glm::length(sum);
             const double distribution = textbook_ggx(h, alpha_x, alpha_y);
-            const double lambda_v = textbook_lambda(v, alpha_x, alpha_y), lambda_l = textbook_lambda(l, alpha_x, alpha_y);
+            const double lambda_v = textbook_lambda(v, alpha_x, alpha_y),
+                         lambda_l = textbook_lambda(l, alpha_x, alpha_y);
             values[0] = distribution / (1.0 + lambda_v + lambda_l) / (4.0 * v.z);
             // Visible normals over the Jacobian of the reflection.
             values[1] = distribution / (1.0 + lambda_v) / (4.0 * v.z);
@@ -307,7 +310,8 @@ std::vector<StabilitySubject> lobe_subjects() {
                                    {lobe, share, direction, direction, direction, density, light_scale, sample_scale}));
         s.furnace = furnace_of([](const glm::dvec3& view, const glm::dvec3& light, double roughness) {
             Library library;
-            return library.sheen_albedo(view.z, roughness) * library.sheen_density(library.sheen_map(view, roughness), light);
+            return library.sheen_albedo(view.z, roughness) *
+                   library.sheen_density(library.sheen_map(view, roughness), light);
         });
     }
     {

@@ -37,8 +37,9 @@ ReportCell count_cell(std::uint64_t count) {
 
 ReportTable main_table(const StabilityReport& report) {
     ReportTable table{.title = "Closures",
-                      .note = "Errors are relative, above a floor of 1e-7 of the lobe's scale. The furnace's minimum is "
-                              "that of what absorbs nothing, where the closure has such slabs.",
+                      .note =
+                          "Errors are relative, above a floor of 1e-7 of the lobe's scale. The furnace's minimum is "
+                          "that of what absorbs nothing, where the closure has such slabs.",
                       .columns = {"closure", "points", "NaN", "infinite", "negative", "largest error", "closed form",
                                   "furnace", "reciprocity", "chi-square", "largest weight", "variance"}};
     for (const StabilityClosure& c : report.closures) {
@@ -72,11 +73,12 @@ ReportTable device_table(const StabilityReport& report) {
                                   "facets", "million points per second"}};
     for (const StabilityClosure& c : report.closures) {
         for (const StabilityFigures& f : c.devices)
-            table.rows.push_back({text_cell(c.name), text_cell(f.backend), number_cell(fmt::format("{}", f.points)),
-                                  count_cell(f.nan), count_cell(f.inf), count_cell(f.negative),
-                                  number_cell(fmt::format("{:.2g}", f.max_rel_error)),
-                                  number_cell(fmt::format("{}", f.facets)),
-                                  number_cell(fmt::format("{:.2f}", f.seconds > 0.0 ? 1e-6 * static_cast<double>(f.points) / f.seconds : 0.0))});
+            table.rows.push_back(
+                {text_cell(c.name), text_cell(f.backend), number_cell(fmt::format("{}", f.points)), count_cell(f.nan),
+                 count_cell(f.inf), count_cell(f.negative), number_cell(fmt::format("{:.2g}", f.max_rel_error)),
+                 number_cell(fmt::format("{}", f.facets)),
+                 number_cell(
+                     fmt::format("{:.2f}", f.seconds > 0.0 ? 1e-6 * static_cast<double>(f.points) / f.seconds : 0.0))});
     }
     return table;
 }
@@ -181,8 +183,9 @@ ReportPage stability_page(const StabilityReport& report) {
     page.facts.push_back(fmt::format("{} samples in each chi-square test", report.samples));
     page.facts.push_back(fmt::format("{:.0f} s", report.seconds));
     page.tone = violations.empty() ? ReportTone::good : ReportTone::bad;
-    page.verdict = violations.empty() ? "All closures are within what they promise."
-                                      : fmt::format("{} figures are beyond what the closures promise.", violations.size());
+    page.verdict = violations.empty()
+                       ? "All closures are within what they promise."
+                       : fmt::format("{} figures are beyond what the closures promise.", violations.size());
     if (!violations.empty()) {
         ReportTable table{.title = "Beyond", .columns = {"what"}};
         for (const std::string& violation : violations) table.rows.push_back({text_cell(violation)});

@@ -62,8 +62,8 @@ struct StabilitySubject {
     std::function<std::string(const std::uint32_t* words)> describe;
     /// Of view and light, the one nearer to the surface.
     std::function<double(const std::uint32_t* words)> lower_cosine;
-    /// A point of the shader's variant SAMPLES; `words[number_word]` is to be set for each run to the number of its first
-    /// sample.
+    /// A point of the shader's variant SAMPLES; `words[number_word]` is to be set for each run to the number of its
+    /// first sample.
     std::function<void(const materials::Slab&, const glm::dvec3& view, std::uint32_t* words)> make_sampling;
     std::uint32_t number_word = 0;
     /// Parameters for a run; one set serves 64 points in a row.
@@ -71,9 +71,10 @@ struct StabilitySubject {
     /// What formulae of other form give for the results, in double precision; NaN where there is none.
     std::function<void(const std::uint32_t* words, double* values)> closed_form;
 
-    /// What the same text gives for the results of `count` points in a row when it is compiled for the host; the rest is
-    /// left as it is. `parameters`: the set that these points share.
-    std::function<void(const std::uint32_t* words, std::uint32_t count, const float* parameters, double* values)> on_host;
+    /// What the same text gives for the results of `count` points in a row when it is compiled for the host; the rest
+    /// is left as it is. `parameters`: the set that these points share.
+    std::function<void(const std::uint32_t* words, std::uint32_t count, const float* parameters, double* values)>
+        on_host;
     /// The reference is `on_host` instead of a device in double precision.
     bool is_judged_by_host = false;
 

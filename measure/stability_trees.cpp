@@ -117,16 +117,17 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
     std::string main;
     for (const EmbeddedFile& file : embedded_files())
         if (file.path == "measure/stability_tree.glsl") main = file.text;
-    subject.shader = {.name = "tree",
-                      .text = fmt::format("vec3 specular_lut(uint index, vec2 at) {{ return vec3(1.0); }}\n"
-                                          "float tree_parameter(uint index) {{ return parameters[gl_WorkGroupID.x * {}u + "
-                                          "index]; }}\nvec4 tree_texture(uint index) {{ return vec4(1.0); }}\n{}\n{}",
-                                          shader.parameters.size(), shader.glsl, main),
-                      .point_words = sizeof(TreePoint) / 4,
-                      .result_words = static_cast<std::uint32_t>(subject.results.size()),
-                      .parameter_words = static_cast<std::uint32_t>(shader.parameters.size()),
-                      .features = flat.topology.features,
-                      .has_tables = true};
+    subject.shader = {
+        .name = "tree",
+        .text = fmt::format("vec3 specular_lut(uint index, vec2 at) {{ return vec3(1.0); }}\n"
+                            "float tree_parameter(uint index) {{ return parameters[gl_WorkGroupID.x * {}u + "
+                            "index]; }}\nvec4 tree_texture(uint index) {{ return vec4(1.0); }}\n{}\n{}",
+                            shader.parameters.size(), shader.glsl, main),
+        .point_words = sizeof(TreePoint) / 4,
+        .result_words = static_cast<std::uint32_t>(subject.results.size()),
+        .parameter_words = static_cast<std::uint32_t>(shader.parameters.size()),
+        .features = flat.topology.features,
+        .has_tables = true};
     subject.make_point = [](Random& random, std::uint32_t* words) {
         TreePoint point{};
         const glm::dvec3 view = random_direction(random);
@@ -157,7 +158,8 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
             for (const ParameterSource& source : *sources) {
                 float value = source.value;
                 if (random() < changed)
-                    value = source.field == nullptr ? edgy(random) : source.field->get(slabs[source.node], source.channel);
+                    value =
+                        source.field == nullptr ? edgy(random) : source.field->get(slabs[source.node], source.channel);
                 parameters.push_back(value);
             }
         }

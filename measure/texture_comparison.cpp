@@ -313,7 +313,9 @@ Expected<ImageLayer> exr_layer_of(const TextureData& texture) {
     const std::size_t count = std::size_t{texture.width} * texture.height;
     ImageLayer layer{texture.name, {}};
     for (std::uint32_t c = 0; c < format.channels; ++c) {
-        const std::string name = format.has_depth ? (c == 0 ? "Z" : "stencil") : format.channels == 1 ? "Y" : color_names[c];
+        const std::string name = format.has_depth       ? (c == 0 ? "Z" : "stencil")
+                                 : format.channels == 1 ? "Y"
+                                                        : color_names[c];
         if (is_word) {
             std::vector<std::uint32_t> values(count);
             for (std::size_t p = 0; p < count; ++p) values[p] = word_of(texture, p, c);

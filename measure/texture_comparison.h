@@ -25,14 +25,14 @@ namespace nacre::measure {
 
 /// How the bits of a field stand for a value.
 enum class FieldKind : std::uint8_t {
-    uint,          ///< A number or flags: any difference counts.
-    unorm,         ///< code / (2^bits - 1); a step is one code.
-    squared,       ///< (code / (2^bits - 1))^2; a step is one code.
-    snorm,         ///< Two's complement, code / (2^(bits-1) - 1); a step is one code.
-    ufloat,        ///< Unsigned float of any layout, or any code that grows with its value; a step is one code.
-    circular,      ///< code / 2^bits of a turn; a step is one code, the last code neighbors the first.
-    octahedral,    ///< A direction: x in the lower half of the bits, y in the upper (`bits` even); with h bits each, codes
-                   ///< 0 to 2^h - 2 are [-1, 1], so that -1, 0 and 1 are exact (Meyer et al. 2010).
+    uint,        ///< A number or flags: any difference counts.
+    unorm,       ///< code / (2^bits - 1); a step is one code.
+    squared,     ///< (code / (2^bits - 1))^2; a step is one code.
+    snorm,       ///< Two's complement, code / (2^(bits-1) - 1); a step is one code.
+    ufloat,      ///< Unsigned float of any layout, or any code that grows with its value; a step is one code.
+    circular,    ///< code / 2^bits of a turn; a step is one code, the last code neighbors the first.
+    octahedral,  ///< A direction: x in the lower half of the bits, y in the upper (`bits` even); with h bits each,
+                 ///< codes 0 to 2^h - 2 are [-1, 1], so that -1, 0 and 1 are exact (Meyer et al. 2010).
 };
 
 /// "uint", "unorm", ... as in JSON.
@@ -64,7 +64,7 @@ struct TextureData {
 struct FieldDifference {
     std::string name;
     std::uint64_t differing = 0;  ///< Texels with more than one quantization step between the values.
-    double max_abs = 0.0;         ///< Largest difference of decoded values (radians for octahedral, turns for circular).
+    double max_abs = 0.0;  ///< Largest difference of decoded values (radians for octahedral, turns for circular).
 };
 
 struct TextureDifference {

@@ -7,8 +7,8 @@
 #include "scene/scene.h"
 
 /// @file
-/// A camera as shaders see it: CameraBlock of passes/shared/camera.glsl. Clip space as in docs/conventions.md (y down), depth
-/// reversed: 1 at the near plane, 0 far away.
+/// A camera as shaders see it: CameraBlock of passes/shared/camera.glsl. Clip space as in docs/conventions.md (y down),
+/// depth reversed: 1 at the near plane, 0 far away.
 ///
 ///     CameraBlock block = camera_block(camera, 1280, 720);
 

@@ -188,10 +188,11 @@ void FrameGraph::find_live_passes() {
     for (std::size_t i = 0; i < textures_.size(); ++i) texture_needed[i] = textures_[i].kept;
     for (std::size_t i = 0; i < buffers_.size(); ++i) buffer_needed[i] = buffers_[i].kept;
     for (auto pass = passes_.rbegin(); pass != passes_.rend(); ++pass) {
-        pass->is_live = pass->always || std::ranges::any_of(pass->accesses, [&](const Access& access) {
-                            return has_any(access.use, rhi::writing_uses) &&
-                                   (access.is_texture ? texture_needed[access.resource] : buffer_needed[access.resource]);
-                        });
+        pass->is_live =
+            pass->always || std::ranges::any_of(pass->accesses, [&](const Access& access) {
+                return has_any(access.use, rhi::writing_uses) &&
+                       (access.is_texture ? texture_needed[access.resource] : buffer_needed[access.resource]);
+            });
         if (!pass->is_live) continue;
         for (const Access& access : pass->accesses) {
             if (access.is_texture) {

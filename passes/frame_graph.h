@@ -15,12 +15,10 @@
 /// lives do not overlap share memory, and records what is left in the order in which it was declared.
 ///
 ///     FrameGraph graph;
-///     TextureId color = graph.add_texture({.format = Format::rgba8_unorm, .width = 64, .height = 64, .name = "color"});
-///     graph.add_pass("fill").uses(color, ResourceUse::storage_write).records([&](PassContext& pass) { ... });
-///     graph.keep(color);
-///     NACRE_CHECK(graph.compile());
-///     NACRE_CHECK(graph.realize(device));
-///     graph.record(list);                       // every frame
+///     TextureId color = graph.add_texture({.format = Format::rgba8_unorm, .width = 64, .height = 64, .name =
+///     "color"}); graph.add_pass("fill").uses(color, ResourceUse::storage_write).records([&](PassContext& pass) { ...
+///     }); graph.keep(color); NACRE_CHECK(graph.compile()); NACRE_CHECK(graph.realize(device)); graph.record(list); //
+///     every frame
 ///
 /// A graph is declared once and recorded for many frames: recording makes nothing. It is not thread-safe. Barriers
 /// are the RHI's work; the statements made here let its verify mode check them.

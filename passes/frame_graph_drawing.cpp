@@ -44,7 +44,8 @@ std::string FrameGraph::to_dot() const {
     auto out = std::back_inserter(text);
     for (std::size_t i = 0; i < passes_.size(); ++i) {
         fmt::format_to(out, "  p{} [shape=box, style=\"filled{}\", fillcolor=\"{}\", label=\"{}\"];\n", i,
-                       passes_[i].is_live ? "" : ",dashed", passes_[i].is_live ? "#ffd9a0" : "#eeeeee", passes_[i].name);
+                       passes_[i].is_live ? "" : ",dashed", passes_[i].is_live ? "#ffd9a0" : "#eeeeee",
+                       passes_[i].name);
     }
     for (std::size_t i = 0; i < textures_.size(); ++i) {
         const TextureNode& node = textures_[i];
@@ -171,10 +172,11 @@ std::string FrameGraph::to_svg() const {
         if (!passes_[i].is_live) continue;
         for (const Access& access : passes_[i].accesses) {
             if (!is_drawn(access)) continue;
-            const int x = column_x(access.is_texture ? texture_column[access.resource] : buffer_column[access.resource]);
+            const int x =
+                column_x(access.is_texture ? texture_column[access.resource] : buffer_column[access.resource]);
             const bool writes = has_any(access.use, rhi::writing_uses);
-            fmt::format_to(out, "<circle cx=\"{}\" cy=\"{}\" r=\"5\" fill=\"{}\" stroke=\"{}\" stroke-width=\"2\"/>\n", x,
-                           row_y(row_of[i]), writes ? "#c03020" : "#ffffff", writes ? "#c03020" : "#2060a0");
+            fmt::format_to(out, "<circle cx=\"{}\" cy=\"{}\" r=\"5\" fill=\"{}\" stroke=\"{}\" stroke-width=\"2\"/>\n",
+                           x, row_y(row_of[i]), writes ? "#c03020" : "#ffffff", writes ? "#c03020" : "#2060a0");
         }
     }
     fmt::format_to(

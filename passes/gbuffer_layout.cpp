@@ -37,7 +37,8 @@ std::span<const Field> gbuffer_fields() { return all_fields; }
 
 std::span<const Field> fields_of(std::string_view texture) {
     const auto first = std::ranges::find(all_fields, texture, &Field::word);
-    const auto last = std::find_if(first, std::end(all_fields), [&](const Field& field) { return field.word != texture; });
+    const auto last =
+        std::find_if(first, std::end(all_fields), [&](const Field& field) { return field.word != texture; });
     return {first, last};
 }
 
@@ -97,8 +98,8 @@ std::string gbuffer_glsl() {
             case FieldKind::squared: {
                 const bool squared = field.kind == FieldKind::squared;
                 text += fmt::format("uint pack_{0}(float value) {{ return uint({1} * {2}.0 + 0.5) << {3}u; }}\n",
-                                    field.name, squared ? "sqrt(clamp(value, 0.0, 1.0))" : "clamp(value, 0.0, 1.0)", mask,
-                                    field.shift);
+                                    field.name, squared ? "sqrt(clamp(value, 0.0, 1.0))" : "clamp(value, 0.0, 1.0)",
+                                    mask, field.shift);
                 text += fmt::format("float unpack_{0}(uint word) {{ float unit = float({1}) / {2}.0; return {3}; }}\n",
                                     field.name, shifted, mask, squared ? "unit * unit" : "unit");
                 break;

@@ -14,9 +14,9 @@
 ///     for (const Field& field : fields_of("top_layer"))
 ///         if (field_differs(field, word_a, word_b)) ++differing;
 ///
-/// A pixel of a plain slab is three 32-bit words, 12 bytes: `material.0` and `material.1` (the slab) and `top_layer` (what effects in
-/// screen space want to know without reading the slab). Reflectances are stored as square roots, so that steps are even
-/// to the eye and decoding is one exact multiplication.
+/// A pixel of a plain slab is three 32-bit words, 12 bytes: `material.0` and `material.1` (the slab) and `top_layer`
+/// (what effects in screen space want to know without reading the slab). Reflectances are stored as square roots, so
+/// that steps are even to the eye and decoding is one exact multiplication.
 
 namespace nacre::passes {
 
@@ -57,8 +57,8 @@ std::span<const Field> fields_of(std::string_view texture);
 /// The decoded value: one number, or the three coordinates of a vector (the others are 0).
 [[nodiscard]] std::array<float, 3> decode_field(const Field& field, std::uint32_t word);
 
-/// True when the field's values in two words are further apart than one quantisation step (for identifiers: not equal; for
-/// vectors: a larger angle than between neighboring codes, so that the seams of the octahedron do not count).
+/// True when the field's values in two words are further apart than one quantisation step (for identifiers: not equal;
+/// for vectors: a larger angle than between neighboring codes, so that the seams of the octahedron do not count).
 [[nodiscard]] bool field_differs(const Field& field, std::uint32_t a, std::uint32_t b);
 
 /// GLSL text with a `pack_NAME` and `unpack_NAME` for every field; what "passes/shared/gbuffer_fields.glsl" holds.

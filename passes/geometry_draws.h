@@ -9,8 +9,8 @@
 #include "passes/render_pass.h"
 
 /// @file
-/// How passes draw the scene's geometry: what a pass asks of it, pipelines for the kinds of draws that there are, and what
-/// drawing them reads.
+/// How passes draw the scene's geometry: what a pass asks of it, pipelines for the kinds of draws that there are, and
+/// what drawing them reads.
 
 namespace nacre::passes {
 
@@ -26,8 +26,8 @@ struct GeometryPassDesc {
     rhi::DepthStencilState depth_stencil;
     std::vector<rhi::ColorTargetState> color_targets;
     rhi::BindGroupLayout frame_layout;      ///< Of set 0.
-    /// Fragment shader of materials that are shaded by closures: "passes/closures/base_pass_" for base_pass_N.frag, N the
-    /// topology. Empty: the pass draws them as plain slabs.
+    /// Fragment shader of materials that are shaded by closures: "passes/closures/base_pass_" for base_pass_N.frag, N
+    /// the topology. Empty: the pass draws them as plain slabs.
     std::string closure_shader;
     std::vector<rhi::ShaderDefine> closure_defines;           ///< For those shaders alone.
     std::vector<rhi::ColorTargetState> closure_color_targets; ///< Of those shaders; empty: as color_targets.
@@ -60,7 +60,8 @@ class GeometryDraws {
         bool by_closures = false;
     };
     void record_item(rhi::CommandList& list, const Item& item, rhi::BindGroup frame_group, std::uint32_t pipeline,
-                     std::uint32_t& bound_pipeline, std::uint32_t& bound_material, rhi::BindGroup closure_group = {}) const;
+                     std::uint32_t& bound_pipeline, std::uint32_t& bound_material,
+                     rhi::BindGroup closure_group = {}) const;
 
     const ShaderLibrary* shaders_ = nullptr;
     const SceneGeometry* geometry_ = nullptr;

@@ -20,11 +20,12 @@ class GeometryPass : public RenderPass {
     [[nodiscard]] std::uint64_t draw_count() const override { return draws_.size(); }
 
   protected:
-    /// The description's name is that of the pass; its `frame_layout` is set to the camera's. `selected`: indices of draws.
+    /// The description's name is that of the pass; its `frame_layout` is set to the camera's. `selected`: indices of
+    /// draws.
     GeometryPass(const RenderContext& context, GeometryPassDesc desc, std::vector<std::uint32_t> selected);
 
-    /// Draws in this pass of the graph: states what the draws read, and records them with the targets that `targets` gives
-    /// in each frame. Which targets the pass uses is stated by the caller.
+    /// Draws in this pass of the graph: states what the draws read, and records them with the targets that `targets`
+    /// gives in each frame. Which targets the pass uses is stated by the caller.
     void draws_in(PassDeclaration& pass, const RenderContext& context,
                   std::function<rhi::RenderPassDesc(const PassContext&)> targets,
                   std::optional<std::uint32_t> stencil_reference = {});

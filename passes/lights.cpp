@@ -50,7 +50,8 @@ float farthest_corner(const scene::Bounds& bounds, const glm::vec3& from) {
 /// Filter taps reach this many texels over the edge of a view.
 float margin(const Profile& profile) { return 0.5f * static_cast<float>(profile.shadow_filter_width) + 2.0f; }
 
-glm::mat4 directional_view(const Light& light, const scene::Bounds& bounds, const Profile& profile, float& texel_width) {
+glm::mat4 directional_view(const Light& light, const scene::Bounds& bounds, const Profile& profile,
+                           float& texel_width) {
     const glm::vec3 center = bounds.center();
     const glm::mat4 view = look_along(center, light.direction);
     const scene::Bounds seen = bounds.transformed(view);
@@ -89,8 +90,9 @@ LightSetup set_up_lights(const std::vector<Light>& lights, const scene::Bounds& 
     std::iota(chosen.begin(), chosen.end(), std::size_t{0});
     std::erase_if(chosen, [&](std::size_t i) { return !(strength(lights[i], center) > 0.0f); });
     if (chosen.size() > profile.lights) {
-        setup.warnings.push_back(fmt::format("the scene has {} lights, profile '{}' has room for {}: the weakest are left out",
-                                             chosen.size(), profile.name, profile.lights));
+        setup.warnings.push_back(
+            fmt::format("the scene has {} lights, profile '{}' has room for {}: the weakest are left out",
+                        chosen.size(), profile.name, profile.lights));
         std::ranges::stable_sort(chosen, std::greater<>{}, [&](std::size_t i) { return strength(lights[i], center); });
         chosen.resize(profile.lights);
         std::ranges::sort(chosen);
@@ -146,13 +148,14 @@ LightSetup set_up_lights(const std::vector<Light>& lights, const scene::Bounds& 
         setup.lights.push_back(packed);
     }
     if (without_shadow > 0) {
-        setup.warnings.push_back(fmt::format("{} lights cast no shadow: profile '{}' has room for {} shadow views", without_shadow,
-                                             profile.name, profile.shadow_views));
+        setup.warnings.push_back(fmt::format("{} lights cast no shadow: profile '{}' has room for {} shadow views",
+                                             without_shadow, profile.name, profile.shadow_views));
     }
     return setup;
 }
 
-std::vector<std::byte> light_block(const LightSetup& setup, std::uint32_t light_capacity, std::uint32_t shadow_capacity) {
+std::vector<std::byte> light_block(const LightSetup& setup, std::uint32_t light_capacity,
+                                   std::uint32_t shadow_capacity) {
     std::vector<std::byte> bytes(16 + light_capacity * sizeof(PackedLight) + shadow_capacity * sizeof(glm::mat4));
     const std::uint32_t counts[4] = {static_cast<std::uint32_t>(setup.lights.size()),
                                      static_cast<std::uint32_t>(setup.shadow_views.size()), 0, 0};

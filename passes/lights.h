@@ -35,13 +35,14 @@ struct LightSetup {
 };
 
 /// Chooses the lights that the profile has room for (the strongest as seen from the middle of the bounds) and shadow
-/// views for as many of them as its shadow map has room for, in the order of the scene. A point light takes six views, and
-/// so does a spot light wider than 120 degrees, whose cone would stretch a single map too far.
+/// views for as many of them as its shadow map has room for, in the order of the scene. A point light takes six views,
+/// and so does a spot light wider than 120 degrees, whose cone would stretch a single map too far.
 LightSetup set_up_lights(const std::vector<scene::Light>& lights, const scene::Bounds& bounds, const Profile& profile,
                          bool with_shadows);
 
 /// The bytes of LightBlock for lists of the given capacities (at least as many as there are).
-std::vector<std::byte> light_block(const LightSetup& setup, std::uint32_t light_capacity, std::uint32_t shadow_capacity);
+std::vector<std::byte> light_block(const LightSetup& setup, std::uint32_t light_capacity,
+                                   std::uint32_t shadow_capacity);
 
 /// Length of a list in a shader for a number of entries: the next power of two, so that few shaders differ. 0 stays 0.
 std::uint32_t list_capacity(std::size_t entries);

@@ -34,11 +34,12 @@ std::string features_of(const PlannedShader& shader) {
 std::string to_text(const Plan& plan) {
     std::string text;
     auto out = std::back_inserter(text);
-    fmt::format_to(out, "scene    {}\nprofile  {}\ndevice   {} ({})\nsize     {} x {}\n\nPasses\n", plan.scene, plan.profile,
-                   plan.device, plan.backend, plan.width, plan.height);
+    fmt::format_to(out, "scene    {}\nprofile  {}\ndevice   {} ({})\nsize     {} x {}\n\nPasses\n", plan.scene,
+                   plan.profile, plan.device, plan.backend, plan.width, plan.height);
     for (const PlannedPass& pass : plan.passes) {
         fmt::format_to(out, "  {}{}\n    reads   {}\n    writes  {}\n", pass.name,
-                       pass.draws > 0 ? fmt::format(" ({} draws)", pass.draws) : "", joined(pass.reads), joined(pass.writes));
+                       pass.draws > 0 ? fmt::format(" ({} draws)", pass.draws) : "", joined(pass.reads),
+                       joined(pass.writes));
         for (const PlannedShader& shader : pass.shaders) {
             fmt::format_to(out, "    shader  {} [{}] {} {:016x}\n", shader.path, features_of(shader),
                            size_text(shader.spirv_bytes), shader.spirv_hash);
@@ -62,8 +63,9 @@ std::string to_text(const Plan& plan) {
     fmt::format_to(out,
                    "\nBytes\n  G-buffer   {} per pixel\n  transient  {} ({} without sharing)\n  persistent {}\n"
                    "  geometry   {}\n  textures   {}\n\nLeft out\n",
-                   plan.gbuffer_bytes_per_pixel, size_text(plan.transient_bytes), size_text(plan.transient_bytes_unshared),
-                   size_text(plan.persistent_bytes), size_text(plan.geometry_bytes), size_text(plan.texture_bytes));
+                   plan.gbuffer_bytes_per_pixel, size_text(plan.transient_bytes),
+                   size_text(plan.transient_bytes_unshared), size_text(plan.persistent_bytes),
+                   size_text(plan.geometry_bytes), size_text(plan.texture_bytes));
     for (const LeftOut& left_out : plan.left_out) fmt::format_to(out, "  {}: {}\n", left_out.what, left_out.why);
     if (plan.left_out.empty()) text += "  nothing\n";
     return text;

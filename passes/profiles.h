@@ -35,7 +35,7 @@ struct Profile {
     bool float32_lit_color = false;           ///< Lit color with 32 instead of 16 bits per channel.
     DiffuseModel diffuse_model = DiffuseModel::chan;
     std::uint32_t lights = 64;                ///< Punctual lights; the weakest beyond are left out, with a warning.
-    std::uint32_t shadow_views = 16;          ///< Layers of the shadow map: 1 for directional and spot, 6 for point lights.
+    std::uint32_t shadow_views = 16;  ///< Layers of the shadow map: 1 for directional and spot, 6 for point lights.
     std::uint32_t shadow_map_size = 1024;     ///< Texels along one side of a layer.
     std::uint32_t shadow_filter_width = 3;    ///< PCF: filter_width^2 bilinear taps; 1, 3 or 5.
     std::uint32_t environment_size = 256;     ///< Largest side of a cube face.

@@ -22,8 +22,9 @@ void uses_lighting(PassDeclaration& pass, const FrameResources& resources) {
 }
 
 std::vector<rhi::ShaderDefine> lighting_defines(const Decisions& decisions) {
-    std::vector<rhi::ShaderDefine> defines = {{"ENVIRONMENT_MIPS", std::to_string(decisions.environment_mips)},
-                                              {"NACRE_DIFFUSE_MODEL", std::to_string(std::to_underlying(decisions.diffuse_model))}};
+    std::vector<rhi::ShaderDefine> defines = {
+        {"ENVIRONMENT_MIPS", std::to_string(decisions.environment_mips)},
+        {"NACRE_DIFFUSE_MODEL", std::to_string(std::to_underlying(decisions.diffuse_model))}};
     if (decisions.light_capacity > 0) defines.push_back({"LIGHTS", std::to_string(decisions.light_capacity)});
     if (decisions.shadow_capacity > 0) {
         defines.push_back({"SHADOW_VIEWS", std::to_string(decisions.shadow_capacity)});

@@ -98,8 +98,10 @@ Expected<FrameStatistics> Renderer::render_frame() {
     live = 0;
     for (const FrameGraph::Pass& pass : state.graph.passes()) {
         if (!pass.is_live) continue;
-        const double ms = times.empty() ? 0.0
-                                        : static_cast<double>(static_cast<std::int64_t>(times[2 * live + 1] - times[2 * live])) * 1e-6;
+        const double ms =
+            times.empty()
+                ? 0.0
+                : static_cast<double>(static_cast<std::int64_t>(times[2 * live + 1] - times[2 * live])) * 1e-6;
         statistics.passes.push_back({pass.name, ms});
         ++live;
     }
@@ -120,7 +122,8 @@ Expected<FrameStatistics> Renderer::render_frame() {
 Expected<FinalPicture> Renderer::read_final() {
     State& state = *state_;
     if (!state.has_frame) {
-        return fail(ErrorCode::invalid_argument, "read picture", "", "no frame has been rendered", "Call render_frame first.");
+        return fail(ErrorCode::invalid_argument, "read picture", "", "no frame has been rendered",
+                    "Call render_frame first.");
     }
     FinalPicture picture;
     NACRE_TRY(const auto bytes, state.device.read_texture(state.graph.texture(state.resources.final_color)));
@@ -211,8 +214,10 @@ Expected<IntermediateContent> Renderer::read_hits(std::string_view name, std::ui
                     "Set RenderOptions::shade_hits and render a frame.");
     }
     if (!texture) {
-        return fail(ErrorCode::not_found, "read shaded hits", fmt::format("'{}'", name), "there is nothing of that name",
-                    "There are material.0, material.1, top_layer, albedo, emission, and material.slices where closures need it.");
+        return fail(ErrorCode::not_found, "read shaded hits", fmt::format("'{}'", name),
+                    "there is nothing of that name",
+                    "There are material.0, material.1, top_layer, albedo, emission, and material.slices where closures "
+                    "need it.");
     }
     NACRE_TRY(const rhi::TextureDesc desc, state_->device.describe(texture));
     if (layer >= desc.layers) {
@@ -220,8 +225,14 @@ Expected<IntermediateContent> Renderer::read_hits(std::string_view name, std::ui
                     fmt::format("it has {} layers", desc.layers), "Count from 0.");
     }
     IntermediateContent content;
-    content.description = {.name = std::string(name), .format = desc.format, .width = desc.width, .height = desc.height,
-                           .layers = desc.layers, .written_by = "hit shading", .fields = fields_of(name), .is_readable = true};
+    content.description = {.name = std::string(name),
+                           .format = desc.format,
+                           .width = desc.width,
+                           .height = desc.height,
+                           .layers = desc.layers,
+                           .written_by = "hit shading",
+                           .fields = fields_of(name),
+                           .is_readable = true};
     content.width = desc.width;
     content.height = desc.height;
     NACRE_TRY(content.bytes, state_->device.read_texture(texture, 0, layer));

@@ -42,8 +42,8 @@ enum class ToneMapping : std::uint8_t {
     linear,  ///< Clamps at 1; for comparisons.
 };
 
-/// Parts of a renderer that can be made not to exist (`RenderOptions::without`), for tests and for looking at one thing at
-/// a time. A scene that does not use a feature gives the same plan with and without it.
+/// Parts of a renderer that can be made not to exist (`RenderOptions::without`), for tests and for looking at one thing
+/// at a time. A scene that does not use a feature gives the same plan with and without it.
 enum class Feature : std::uint32_t {
     none = 0,
     emission = 1u << 0, alpha_test = 1u << 1, blend = 1u << 2, unlit = 1u << 3, shadows = 1u << 4,
@@ -64,13 +64,13 @@ struct RenderOptions {
     std::uint32_t height = 720;
     std::string camera;                       ///< Name or index in the scene; empty: its first.
     const scene::Environment* environment = nullptr;  ///< In place of the scene's own; read in `create`.
-    std::optional<float> exposure_ev;         ///< Stops: light is multiplied by 2^EV. Empty: metered (docs/exposure.md).
+    std::optional<float> exposure_ev;  ///< Stops: light is multiplied by 2^EV. Empty: metered (docs/exposure.md).
     ToneMapping tone_mapping = ToneMapping::filmic;
     bool keep_intermediates = false;          ///< Every intermediate can be read after a frame; none share memory.
     std::vector<std::string> keep;            ///< As above for these names only.
     Feature without = Feature::none;
-    /// After each frame, shade what the camera sees once more in a compute shader, from the blobs of the materials as hits of
-    /// rays are shaded, for `read_hits` (docs/materials.md). Costs time and memory; the picture is the same.
+    /// After each frame, shade what the camera sees once more in a compute shader, from the blobs of the materials as
+    /// hits of rays are shaded, for `read_hits` (docs/materials.md). Costs time and memory; the picture is the same.
     bool shade_hits = false;
     DiskCache* cache = nullptr;               ///< For compiled shaders; null: nothing is kept.
     /// Root of a source tree whose shaders are used in place of those in the program, and followed by `reload_shaders`;
@@ -143,10 +143,10 @@ class Renderer {
     Expected<IntermediateContent> read_intermediate(std::string_view name, std::uint32_t layer = 0,
                                                     std::uint32_t mip = 0);
 
-    /// With RenderOptions::shade_hits, what was stored or found for each pixel: "material.0", "material.1", "top_layer" and
-    /// "material.slices" as the base pass stores them; "albedo" (rgb: towards the viewer; a: roughness) and "emission" (rgb:
-    /// cd/m2; a: 1 where the alpha test lets the surface be) as floats. Where nothing is seen all is 0. Errors: not_found,
-    /// invalid_argument.
+    /// With RenderOptions::shade_hits, what was stored or found for each pixel: "material.0", "material.1", "top_layer"
+    /// and "material.slices" as the base pass stores them; "albedo" (rgb: towards the viewer; a: roughness) and
+    /// "emission" (rgb: cd/m2; a: 1 where the alpha test lets the surface be) as floats. Where nothing is seen all is
+    /// 0. Errors: not_found, invalid_argument.
     Expected<IntermediateContent> read_hits(std::string_view name, std::uint32_t layer = 0);
 
     /// Four doubles for each texel of an intermediate texture of floats or fixed-point numbers, with all the precision

@@ -19,7 +19,8 @@ std::vector<materials::SingleSlab> make_slabs(const scene::Scene& scene, const C
     std::vector<materials::SingleSlab> slabs;
     slabs.reserve(scene.materials.size());
     for (std::uint32_t i = 0; i < scene.materials.size(); ++i) {
-        materials::SingleSlab slab = kinds.kind_of(i) != 0 ? kinds.slab_of(i) : materials::single_slab(scene.materials[i]);
+        materials::SingleSlab slab =
+            kinds.kind_of(i) != 0 ? kinds.slab_of(i) : materials::single_slab(scene.materials[i]);
         if (has(without, Feature::emission)) slab.emission = glm::vec3(0.0f), slab.emission_texture = {};
         if (has(without, Feature::alpha_test) && slab.alpha_mode == materials::AlphaMode::mask) {
             slab.alpha_mode = materials::AlphaMode::opaque;
@@ -34,7 +35,8 @@ std::vector<materials::SingleSlab> make_slabs(const scene::Scene& scene, const C
         if (has(without, Feature::texture_transforms)) {
             for (materials::TextureReference* texture :
                  {&slab.base_color_texture, &slab.metallic_roughness_texture, &slab.normal_texture,
-                  &slab.occlusion_texture, &slab.emission_texture, &slab.specular_texture, &slab.specular_color_texture}) {
+                  &slab.occlusion_texture, &slab.emission_texture, &slab.specular_texture,
+                  &slab.specular_color_texture}) {
                 texture->transform = {};
             }
         }
@@ -51,31 +53,35 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
     const rhi::Capabilities& capabilities = device.capabilities();
     NACRE_TRY(profile, find_profile(options.profile));
     const auto unsupported = [&](std::string reason, std::string remedy) {
-        return fail(ErrorCode::unsupported, "render with profile", fmt::format("'{}'", profile->name), std::move(reason),
-                    std::move(remedy));
+        return fail(ErrorCode::unsupported, "render with profile", fmt::format("'{}'", profile->name),
+                    std::move(reason), std::move(remedy));
     };
     if (options.width == 0 || options.height == 0 || options.width > capabilities.max_texture_2d ||
         options.height > capabilities.max_texture_2d || options.width > 65535 * 8 || options.height > 65535 * 8) {
-        return fail(ErrorCode::invalid_argument, "render", fmt::format("a picture of {} x {}", options.width, options.height),
+        return fail(ErrorCode::invalid_argument, "render",
+                    fmt::format("a picture of {} x {}", options.width, options.height),
                     fmt::format("both sides must be 1 to {} pixels on this device", capabilities.max_texture_2d),
                     "Choose another size.");
     }
     if (capabilities.max_color_targets < 3) {
-        return unsupported(fmt::format("the G-buffer needs 3 color targets, the device has {}", capabilities.max_color_targets),
-                           "Use another device.");
+        return unsupported(
+            fmt::format("the G-buffer needs 3 color targets, the device has {}", capabilities.max_color_targets),
+            "Use another device.");
     }
     if (capabilities.max_storage_buffers[2] < 2 || capabilities.max_storage_images[2] < 1) {
-        return unsupported("tiled lighting needs 2 storage buffers and 1 storage image in compute shaders, which the device "
-                           "does not have",
-                           "Use another device.");
+        return unsupported(
+            "tiled lighting needs 2 storage buffers and 1 storage image in compute shaders, which the device "
+            "does not have",
+            "Use another device.");
     }
 
     NACRE_TRY(kinds, CustomKinds::choose(scene));
     const auto slabs = make_slabs(scene, kinds, options.without);
     const bool colors = !has(options.without, Feature::vertex_colors);
     if (!has(options.without, Feature::closures)) {
-        NACRE_TRY(closures, SceneClosures::choose(scene, *profile, profile->storage_in_fragment && capabilities.storage_in_fragment,
-                                                  warnings));
+        NACRE_TRY(closures,
+                  SceneClosures::choose(scene, *profile,
+                                        profile->storage_in_fragment && capabilities.storage_in_fragment, warnings));
     }
     NACRE_TRY(geometry, SceneGeometry::create(device, scene, slabs, closures, kinds, all_textures, colors));
     std::vector<bool> used(slabs.size());
@@ -99,15 +105,17 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
                                                        materials::StorageClass::simple;
         (draw.features.unlit ? decisions.unlit : decisions.slab) = true;
     }
-    const float anisotropy = capabilities.anisotropic_filtering
-                                 ? std::min(static_cast<float>(profile->texture_anisotropy), capabilities.max_anisotropy)
-                                 : 1.0f;
+    const float anisotropy =
+        capabilities.anisotropic_filtering
+            ? std::min(static_cast<float>(profile->texture_anisotropy), capabilities.max_anisotropy)
+            : 1.0f;
     NACRE_TRY(materials, SceneMaterials::create(device, scene, slabs, closures, kinds, used, all_textures, anisotropy));
 
     // Float targets, where the profile wants them and the device has them.
     const bool wants_32 = profile->float32_lit_color;
     decisions.lit_format = rhi::Format::rgba16_float;
-    if (wants_32 && capabilities.supports(rhi::Format::rgba32_float, FormatSupport::storage_image | FormatSupport::blended)) {
+    if (wants_32 &&
+        capabilities.supports(rhi::Format::rgba32_float, FormatSupport::storage_image | FormatSupport::blended)) {
         decisions.lit_format = rhi::Format::rgba32_float;
     } else if (wants_32) {
         warnings.push_back("the device cannot blend into 32-bit float targets: the lit color has 16 bits");
@@ -127,9 +135,11 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
     decisions.filmic = options.tone_mapping == ToneMapping::filmic;
 
     // Lights matter to lit surfaces only.
-    const bool lit_surfaces = std::ranges::any_of(geometry->draws(), [](const Draw& draw) { return !draw.features.unlit; });
+    const bool lit_surfaces =
+        std::ranges::any_of(geometry->draws(), [](const Draw& draw) { return !draw.features.unlit; });
     if (lit_surfaces && !has(options.without, Feature::lights)) {
-        light_setup = set_up_lights(scene.lights, geometry->bounds(), *profile, !has(options.without, Feature::shadows));
+        light_setup =
+            set_up_lights(scene.lights, geometry->bounds(), *profile, !has(options.without, Feature::shadows));
         warnings.insert(warnings.end(), light_setup.warnings.begin(), light_setup.warnings.end());
     }
     decisions.light_capacity = list_capacity(light_setup.lights.size());
@@ -143,7 +153,8 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
         if (!needed) left_out.push_back({what, why});
     };
     leave_out(decisions.alpha_test, "alpha test prepass", "no material has alpha mode MASK");
-    leave_out(decisions.emission, "stencil prepass, emission pass, stencil part of the depth target", "no surface emits light");
+    leave_out(decisions.emission, "stencil prepass, emission pass, stencil part of the depth target",
+              "no surface emits light");
     leave_out(decisions.blend, "blend pass", "no material has alpha mode BLEND");
     leave_out(decisions.unlit, "lighting shaders for unlit and mixed tiles", "no surface is unlit");
     leave_out(decisions.closures, "lighting shader for closures, slices of material words",
@@ -154,16 +165,19 @@ Expected<void> Renderer::State::decide(const scene::Scene& scene) {
     leave_out(decisions.automatic_exposure, "exposure metering", "the exposure is given");
     leave_out(vertex_colors, "vertex colors", "no primitive has them");
     leave_out(transforms, "texture transforms", "no texture is moved");
-    leave_out((textures & texture_bit(TextureSlot::normal)) != 0, "normal maps, tangents", "no material has a normal map");
+    leave_out((textures & texture_bit(TextureSlot::normal)) != 0, "normal maps, tangents",
+              "no material has a normal map");
     leave_out((textures & texture_bit(TextureSlot::occlusion)) != 0, "occlusion maps", "no material has one");
     leave_out((textures & (texture_bit(TextureSlot::specular) | texture_bit(TextureSlot::specular_color))) != 0,
               "specular maps", "no material has one");
     leave_out(!decisions.packed_targets, "blending into float targets",
-              profile->float_color_targets ? "the device cannot: integer targets and compute shaders do its work"
-                                           : "the profile does without: integer targets and compute shaders do its work");
+              profile->float_color_targets
+                  ? "the device cannot: integer targets and compute shaders do its work"
+                  : "the profile does without: integer targets and compute shaders do its work");
     if (decisions.blend && decisions.packed_targets && blended > profile->blend_groups) {
-        warnings.push_back(fmt::format("{} blended surfaces share {} groups: where two of a group overlap, only the nearer one shows",
-                                       blended, profile->blend_groups));
+        warnings.push_back(
+            fmt::format("{} blended surfaces share {} groups: where two of a group overlap, only the nearer one shows",
+                        blended, profile->blend_groups));
     }
     return {};
 }

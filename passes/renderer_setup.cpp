@@ -98,7 +98,8 @@ Expected<void> Renderer::State::make_shared_objects(const scene::Scene& scene) {
     for (const SceneGeometry::NamedBuffer& buffer : geometry->buffers()) {
         resources.geometry.push_back(graph.import_buffer(buffer.buffer, buffer.desc, true));
     }
-    if (materials->block()) resources.materials = graph.import_buffer(materials->block(), {.size = 1, .name = "materials"}, true);
+    if (materials->block())
+        resources.materials = graph.import_buffer(materials->block(), {.size = 1, .name = "materials"}, true);
     for (const rhi::Texture texture : materials->textures()) {
         NACRE_TRY(const rhi::TextureDesc desc, device.describe(texture));
         resources.material_textures.push_back(graph.import_texture(texture, desc, true));
@@ -106,7 +107,8 @@ Expected<void> Renderer::State::make_shared_objects(const scene::Scene& scene) {
     resources.interface_table = resources.material_textures[materials->table_place(0)];
 
     // Set 0: the camera alone, and everything that lighting reads.
-    const auto vertex = rhi::ShaderStage::vertex, fragment = rhi::ShaderStage::fragment, compute = rhi::ShaderStage::compute;
+    const auto vertex = rhi::ShaderStage::vertex, fragment = rhi::ShaderStage::fragment,
+               compute = rhi::ShaderStage::compute;
     std::vector<rhi::BindingLayout> bindings = {{0, rhi::BindingType::uniform_buffer, 1, vertex | fragment | compute}};
     std::vector<rhi::BindGroupEntry> entries = {{.binding = 0, .buffer = camera}};
     NACRE_TRY(camera_layout, device.create_bind_group_layout({.bindings = bindings, .name = "camera"}));
@@ -132,8 +134,8 @@ Expected<void> Renderer::State::make_shared_objects(const scene::Scene& scene) {
 }
 
 Expected<void> Renderer::State::make_passes() {
-    context = std::make_unique<RenderContext>(RenderContext{device, graph, *shaders, *geometry, *materials, closures, *profile,
-                                                            decisions, resources});
+    context = std::make_unique<RenderContext>(
+        RenderContext{device, graph, *shaders, *geometry, *materials, closures, *profile, decisions, resources});
     context->width = options.width;
     context->height = options.height;
     context->camera_layout = camera_layout;
@@ -156,7 +158,8 @@ Expected<void> Renderer::State::make_passes() {
     if (decisions.closures && closures.lighting().slices > 0) {
         resources.material_slices = add_target("material.slices", rhi::Format::r32_uint, closures.lighting().slices);
     }
-    if (decisions.emission && decisions.packed_targets) resources.emission = add_target("emission", rhi::Format::r32_uint);
+    if (decisions.emission && decisions.packed_targets)
+        resources.emission = add_target("emission", rhi::Format::r32_uint);
     if (keeps_classes) {
         resources.tile_classes = graph.add_texture(
             {.format = rhi::Format::r32_uint, .width = tiles_x, .height = tiles_y, .name = "tile_classes"});
@@ -168,7 +171,8 @@ Expected<void> Renderer::State::make_passes() {
     resources.tiles = graph.add_buffer({.size = 4 * list_count * tiles_x * tiles_y, .name = "tiles"});
 
     // The group of set 0 needs the shadow maps, which the graph makes; passes take it from the context in `prepare`.
-    if (decisions.shadow_view_count > 0) passes.push_back(make_shadow_maps(*context, shadow_groups, light_setup.shadow_views));
+    if (decisions.shadow_view_count > 0)
+        passes.push_back(make_shadow_maps(*context, shadow_groups, light_setup.shadow_views));
     passes.push_back(make_depth_prepass(*context));
     if (decisions.alpha_test) passes.push_back(make_alpha_test_prepass(*context));
     if (decisions.emission) passes.push_back(make_stencil_prepass(*context));
@@ -214,7 +218,8 @@ Expected<void> Renderer::State::make_passes() {
     if (device.capabilities().timestamps) {
         const auto live = static_cast<std::uint32_t>(
             std::ranges::count_if(graph.passes(), [](const FrameGraph::Pass& pass) { return pass.is_live; }));
-        NACRE_TRY(timestamps, device.create_query_pool({.type = rhi::QueryType::timestamp, .count = 2 * live, .name = "passes"}));
+        NACRE_TRY(timestamps,
+                  device.create_query_pool({.type = rhi::QueryType::timestamp, .count = 2 * live, .name = "passes"}));
     }
     return {};
 }
@@ -261,15 +266,16 @@ void Renderer::State::make_plan(const scene::Scene& scene) {
     add_graph(graph);
     for (const FrameGraph::TextureNode& node : graph.textures()) {
         if (!node.is_live() || node.is_detail) continue;
-        plan.resources.push_back({.name = node.desc.name,
-                                  .format = std::string(rhi::info(node.desc.format).name),
-                                  .width = node.desc.width,
-                                  .height = node.desc.height,
-                                  .layers = node.desc.layers,
-                                  .mips = node.desc.mips,
-                                  .bytes = node.bytes,
-                                  .shares_with = node.shares_with == ~0u ? "" : graph.textures()[node.shares_with].desc.name,
-                                  .persistent = node.imported});
+        plan.resources.push_back(
+            {.name = node.desc.name,
+             .format = std::string(rhi::info(node.desc.format).name),
+             .width = node.desc.width,
+             .height = node.desc.height,
+             .layers = node.desc.layers,
+             .mips = node.desc.mips,
+             .bytes = node.bytes,
+             .shares_with = node.shares_with == ~0u ? "" : graph.textures()[node.shares_with].desc.name,
+             .persistent = node.imported});
         if (node.imported) plan.persistent_bytes += node.bytes;
     }
     for (const FrameGraph::BufferNode& node : graph.buffers()) {

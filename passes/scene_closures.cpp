@@ -48,7 +48,8 @@ std::vector<bool> used_materials(const scene::Scene& scene) {
 /// Whether some of the light from behind a tree reaches the viewer, as far as its numbers tell.
 bool lets_light_through(const FlattenedTree& flat) {
     const materials::ShadedTree shaded = materials::shade(flat, {0.0, 0.0, 1.0});
-    const glm::dvec3 covered = shaded.whole.coverage * shaded.whole.view_transmittance + glm::dvec3(1.0 - shaded.whole.coverage);
+    const glm::dvec3 covered =
+        shaded.whole.coverage * shaded.whole.view_transmittance + glm::dvec3(1.0 - shaded.whole.coverage);
     return std::max({covered.r, covered.g, covered.b}) > 1e-3;
 }
 
@@ -104,9 +105,11 @@ class TextWriter {
               material_.numbers.size());
         print("layout(set = 1, binding = 1) uniform usampler2D interface_texels;\n");
         if (has(materials::slab_medium)) print("layout(set = 1, binding = 2) uniform usampler2D medium_texels;\n");
-        if (has(materials::slab_anisotropy)) print("layout(set = 1, binding = 3) uniform usampler2D anisotropy_texels;\n");
+        if (has(materials::slab_anisotropy))
+            print("layout(set = 1, binding = 3) uniform usampler2D anisotropy_texels;\n");
         for (std::size_t i = 0; i < material_.textures.size(); ++i) {
-            print("layout(set = 1, binding = {}) uniform sampler2D closure_texture_{};\n", first_material_texture + i, i);
+            print("layout(set = 1, binding = {}) uniform sampler2D closure_texture_{};\n", first_material_texture + i,
+                  i);
         }
         print("#include \"materials/closures/table_textures.glsl\"\n");
         if (has(materials::slab_specular_lut)) {
@@ -159,8 +162,8 @@ class TextWriter {
             write_uv_rows(reference.transform, rows);
             const std::size_t row = numbers(rows[0]);
             numbers(rows[1]);
-            texel = fmt::format("closure_texel_moved({}, {}, tree_row({}u), tree_row({}u))", index, reference.uv_set, row,
-                                row + 1);
+            texel = fmt::format("closure_texel_moved({}, {}, tree_row({}u), tree_row({}u))", index, reference.uv_set,
+                                row, row + 1);
         }
         samples_.push_back({index, static_cast<std::uint32_t>(reference.uv_set), std::move(texel), without});
         return fmt::format("closure_sample_{}()", samples_.size() - 1);
@@ -174,7 +177,8 @@ class TextWriter {
             const Sample& at = samples_[i];
             if (at.is_shared) {
                 print("vec4 shared_texel_{};\n", i);
-                reads += fmt::format("#ifdef HAS_UV{0}\n    WHERE_UV{0} shared_texel_{1} = {2};\n#endif\n", at.uv_set, i, at.texel);
+                reads += fmt::format("#ifdef HAS_UV{0}\n    WHERE_UV{0} shared_texel_{1} = {2};\n#endif\n", at.uv_set,
+                                     i, at.texel);
             }
             print(
                 "vec4 closure_sample_{0}() {{\n#ifdef HAS_UV{1}\n    WHERE_UV{1} return {2};\n#endif\n"
@@ -224,7 +228,8 @@ class TextWriter {
     void print_closures() {
         print("uint tree_closure_frame(uint closure) {{\n");
         for (std::size_t i = 0; i < topology_.closures.size(); ++i) {
-            const auto slot = std::ranges::find(topology_.frames, topology_.closures[i].frame) - topology_.frames.begin();
+            const auto slot =
+                std::ranges::find(topology_.frames, topology_.closures[i].frame) - topology_.frames.begin();
             if (slot != 0) print("    if (closure == {}u) return {}u;\n", i, slot);
         }
         print("    return 0u;\n}}\nvec3 tree_emission(TreeState state) {{\n    vec3 sum = vec3(0.0);\n");
@@ -266,7 +271,8 @@ std::set<std::string> names_of_topology(const std::string& text) {
         while (i < text.size() && is_part(text[i])) ++i;
         std::string name = text.substr(start, i - start);
         // tree_row() is there for all of them.
-        if ((name.starts_with("tree_") || name.starts_with("closure_sample_") || name.starts_with("shared_texel_")) && name != "tree_row") {
+        if ((name.starts_with("tree_") || name.starts_with("closure_sample_") || name.starts_with("shared_texel_")) &&
+            name != "tree_row") {
             names.insert(std::move(name));
         }
     }
@@ -281,8 +287,8 @@ void write_uv_rows(const materials::TextureTransform& transform, glm::vec4* rows
     rows[1] = {-s * transform.scale.x, c * transform.scale.y, transform.offset.y, 0.0f};
 }
 
-Expected<SceneClosures> SceneClosures::choose(const scene::Scene& scene, const Profile& profile, bool storage_in_fragment,
-                                              std::vector<std::string>& warnings) {
+Expected<SceneClosures> SceneClosures::choose(const scene::Scene& scene, const Profile& profile,
+                                              bool storage_in_fragment, std::vector<std::string>& warnings) {
     SceneClosures result;
     const std::vector<bool> used = used_materials(scene);
     result.materials_.resize(scene.materials.size());
@@ -290,25 +296,29 @@ Expected<SceneClosures> SceneClosures::choose(const scene::Scene& scene, const P
     // Words beyond the color targets need a storage image.
     const std::uint32_t bytes = storage_in_fragment ? profile.material_bytes : std::min(profile.material_bytes, 12u);
     if (!storage_in_fragment && profile.storage_in_fragment && profile.material_bytes > 12) {
-        warnings.push_back("the device has no storage images in fragment shaders: materials are simplified to 12 bytes");
+        warnings.push_back(
+            "the device has no storage images in fragment shaders: materials are simplified to 12 bytes");
     }
     for (std::uint32_t i = 0; i < scene.materials.size(); ++i) {
         const MaterialDescription& description = scene.materials[i];
         if (!used[i] || !has_several_lobes(description)) continue;
         const materials::Tree tree = description.tree ? *description.tree : materials::tree_of(description);
         const std::uint32_t closures = std::min(profile.material_closures, materials::StorageLayout::max_closures);
-        NACRE_TRY(const materials::Simplification simple, materials::simplify(tree, {.closures = closures, .bytes = bytes}));
+        NACRE_TRY(const materials::Simplification simple,
+                  materials::simplify(tree, {.closures = closures, .bytes = bytes}));
         if (!simple.fits) {
-            warnings.push_back(fmt::format("material '{}' takes more than the profile's {} bytes even as one plain slab",
-                                           description.name, bytes));
+            warnings.push_back(
+                fmt::format("material '{}' takes more than the profile's {} bytes even as one plain slab",
+                            description.name, bytes));
             continue;
         }
         const materials::SimplificationStep& last = simple.steps.back();
         ClosureMaterial material;
         NACRE_TRY(material.flat, materials::flatten(last.tree, last.flatten));
         if (material.flat.topology.frames.size() > materials::StorageLayout::max_frames) {
-            warnings.push_back(fmt::format("material '{}' has more than {} tangent frames: it is shaded as one plain slab",
-                                           description.name, materials::StorageLayout::max_frames));
+            warnings.push_back(
+                fmt::format("material '{}' has more than {} tangent frames: it is shaded as one plain slab",
+                            description.name, materials::StorageLayout::max_frames));
             continue;
         }
         material.features = material.flat.topology.features;
@@ -328,7 +338,8 @@ Expected<SceneClosures> SceneClosures::choose(const scene::Scene& scene, const P
             files->first_material = i;
             files->occlusion = description.occlusion_texture;
             const auto wrap = [&](const char* main) {
-                return fmt::format("#version 460\n{}#include \"{}\"\n#include \"{}\"\n", bindings, files->topology_path, main);
+                return fmt::format("#version 460\n{}#include \"{}\"\n#include \"{}\"\n", bindings, files->topology_path,
+                                   main);
             };
             files->base_pass = wrap("passes/base_pass/base_pass.closures.glsl");
             files->base_pass_path = fmt::format("passes/closures/base_pass_{}.frag", material.topology);
@@ -347,7 +358,8 @@ Expected<SceneClosures> SceneClosures::choose(const scene::Scene& scene, const P
             Lighting& lighting = result.lighting_;
             for (std::size_t c = 0; c < material.layout.closures.size(); ++c) {
                 lighting.features |= material.layout.features[c];
-                if (material.layout.media[c] != materials::StoredMedium::opaque) lighting.features |= materials::slab_medium;
+                if (material.layout.media[c] != materials::StoredMedium::opaque)
+                    lighting.features |= materials::slab_medium;
                 lighting.has_layers |= !material.flat.topology.closures[material.layout.closures[c]].is_top;
             }
             lighting.frames = std::max(lighting.frames, static_cast<std::uint32_t>(material.layout.frames.size()));
@@ -368,12 +380,13 @@ ShadingFeatures SceneClosures::features_of(const ClosureMaterial& material, cons
     features.points = primitive.topology == scene::Topology::point_list;
     features.thin = primitive.topology != scene::Topology::triangle_list;
     if (features.thin) features.attributes |= attribute_bit(Attribute::corner);
-    if (material.needs_tangents && !primitive.tangents.empty()) features.attributes |= attribute_bit(Attribute::tangent);
+    if (material.needs_tangents && !primitive.tangents.empty())
+        features.attributes |= attribute_bit(Attribute::tangent);
     const bool needs_uv0 = (material.features & materials::slab_glints) != 0 ||
                            std::ranges::any_of(material.textures, [](const auto& t) { return t.uv_set == 0; });
     const bool needs_uv1 = std::ranges::any_of(material.textures, [](const auto& t) { return t.uv_set == 1; });
-    const bool needs_colors = std::ranges::any_of(material.flat.visible_tree.nodes,
-                                                  [](const materials::Node& node) { return !node.vertex_colored.empty(); });
+    const bool needs_colors = std::ranges::any_of(
+        material.flat.visible_tree.nodes, [](const materials::Node& node) { return !node.vertex_colored.empty(); });
     if (needs_colors && !primitive.colors.empty()) features.attributes |= attribute_bit(Attribute::color);
     if (needs_uv0 && !primitive.uv0.empty()) features.attributes |= attribute_bit(Attribute::uv0);
     if (needs_uv1 && !primitive.uv1.empty()) features.attributes |= attribute_bit(Attribute::uv1);
@@ -382,9 +395,9 @@ ShadingFeatures SceneClosures::features_of(const ClosureMaterial& material, cons
 
 std::vector<EmbeddedFile> SceneClosures::files() const {
     std::vector<EmbeddedFile> result;
-    static const std::string points =
-        fmt::format("#version 460\n#define MATERIAL_BLOCK_BINDING {}\n#include \"passes/hit_shading/surface_points.glsl\"\n",
-                    sideband_binding);
+    static const std::string points = fmt::format(
+        "#version 460\n#define MATERIAL_BLOCK_BINDING {}\n#include \"passes/hit_shading/surface_points.glsl\"\n",
+        sideband_binding);
     for (const std::unique_ptr<Text>& text : texts_) {
         result.push_back({text->topology_path, text->topology});
         result.push_back({text->base_pass_path, text->base_pass});
@@ -425,7 +438,8 @@ std::string SceneClosures::hit_text() const {
         text +=
             "#define NACRE_TREE_GLINT_POSITION in_uv0\n#if TEXTURE_DETAIL == 0\n#define NACRE_TREE_GLINT_DX in_uv0_dx\n"
             "#define NACRE_TREE_GLINT_DY in_uv0_dy\n#elif TEXTURE_DETAIL == 1\n"
-            "#define NACRE_TREE_GLINT_DX vec2(in_uv0_cone, 0.0)\n#define NACRE_TREE_GLINT_DY vec2(0.0, in_uv0_cone)\n#else\n"
+            "#define NACRE_TREE_GLINT_DX vec2(in_uv0_cone, 0.0)\n#define NACRE_TREE_GLINT_DY vec2(0.0, "
+            "in_uv0_cone)\n#else\n"
             "#define NACRE_TREE_GLINT_DX vec2(0.0)\n#define NACRE_TREE_GLINT_DY vec2(0.0)\n#endif\n";
     }
     // Before names are changed below.
@@ -446,7 +460,8 @@ std::string SceneClosures::hit_text() const {
             "#include \"passes/shared/closure_words.glsl\"\n#include \"passes/shared/closure_properties.glsl\"\n"
             "#undef PLAIN_SLAB\n";
         text += fmt::format(
-            "void own_hit_words_t{}(vec3 to_viewer, float footprint, uvec2 pixel, out uint words[hit_word_capacity], out uint "
+            "void own_hit_words_t{}(vec3 to_viewer, float footprint, uvec2 pixel, out uint words[hit_word_capacity], "
+            "out uint "
             "top_layer, out uint subsurface, out bool has_subsurface) {{\n    uint own[stored_words];\n    "
             "closure_words(to_viewer, footprint, pixel, own, top_layer, subsurface);\n    for (uint i = 0u; i < "
             "hit_word_capacity; ++i) words[i] = i < stored_words ? own[min(i, stored_words - 1u)] : 0u;\n    "
@@ -455,8 +470,10 @@ std::string SceneClosures::hit_text() const {
         for (const std::string& name : names) text += fmt::format("#undef {}\n", name);
     }
     text +=
-        "void tree_hit_words(uint topology, vec3 to_viewer, float footprint, uvec2 pixel, out uint words[hit_word_capacity], out "
-        "uint top_layer, out uint subsurface, out bool has_subsurface) {\n    for (uint i = 0u; i < hit_word_capacity; ++i) "
+        "void tree_hit_words(uint topology, vec3 to_viewer, float footprint, uvec2 pixel, out uint "
+        "words[hit_word_capacity], out "
+        "uint top_layer, out uint subsurface, out bool has_subsurface) {\n    for (uint i = 0u; i < hit_word_capacity; "
+        "++i) "
         "words[i] = 0u;\n    top_layer = subsurface = 0u;\n    has_subsurface = false;\n";
     for (std::size_t t = 0; t < texts_.size(); ++t) {
         text += fmt::format(
@@ -469,7 +486,8 @@ std::string SceneClosures::hit_text() const {
         "emission, out float roughness) {\n    albedo = emission = vec3(0.0);\n    roughness = 1.0;\n";
     for (std::size_t t = 0; t < texts_.size(); ++t) {
         text += fmt::format(
-            "    if (topology == {0}u) closure_properties_t{0}(to_viewer, footprint, albedo, emission, roughness);\n", t);
+            "    if (topology == {0}u) closure_properties_t{0}(to_viewer, footprint, albedo, emission, roughness);\n",
+            t);
     }
     return text + "}\n";
 }

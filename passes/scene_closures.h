@@ -41,8 +41,8 @@ struct ClosureMaterial {
     [[nodiscard]] bool writes_slices() const { return layout.material_words() > 2 || layout.has_subsurface; }
 };
 
-/// Bindings of set 1: the blob, four tables for closures, the sideband, then textures; of trees first their numbers, and the blob
-/// where the sideband of others is.
+/// Bindings of set 1: the blob, four tables for closures, the sideband, then textures; of trees first their numbers,
+/// and the blob where the sideband of others is.
 inline constexpr std::uint32_t closure_table_count = 4;  ///< Interface, medium, anisotropy, specular tints.
 /// Whether closures with these features read a table.
 [[nodiscard]] constexpr bool reads_table(std::uint32_t features, std::uint32_t table) {
@@ -89,8 +89,8 @@ class SceneClosures {
     /// "passes/closures/emission_N.frag". They live
     /// as long as this object.
     [[nodiscard]] std::vector<EmbeddedFile> files() const;
-    /// GLSL for hits of rays (passes/shared/hit_shading.glsl): the closures' library with the features of all materials, the
-    /// text of every topology, and functions that choose among them.
+    /// GLSL for hits of rays (passes/shared/hit_shading.glsl): the closures' library with the features of all
+    /// materials, the text of every topology, and functions that choose among them.
     [[nodiscard]] std::string hit_text() const;
     /// Defines for a shader that reads stored closures.
     [[nodiscard]] std::vector<rhi::ShaderDefine> lighting_defines() const;

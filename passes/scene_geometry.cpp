@@ -75,7 +75,9 @@ Rectangles rectangles_of(const scene::Primitive& thin) {
     return result;
 }
 
-void append(std::vector<std::byte>& to, std::span<const std::byte> bytes) { to.insert(to.end(), bytes.begin(), bytes.end()); }
+void append(std::vector<std::byte>& to, std::span<const std::byte> bytes) {
+    to.insert(to.end(), bytes.begin(), bytes.end());
+}
 
 void append_rows(std::vector<std::byte>& to, const glm::mat4& world) {
     float rows[12];
@@ -112,7 +114,9 @@ Expected<std::unique_ptr<SceneGeometry>> SceneGeometry::create(rhi::Device& devi
                 const materials::SingleSlab& slab = slabs[primitive.material];
                 Draw& draw = shared.draw;
                 draw.material = primitive.material;
-                draw.features = restricted(features_of(slab, primitive, kinds.kind_of(primitive.material), kinds.data_of(primitive.material)), allowed_textures, true, with_colors);
+                draw.features = restricted(
+                    features_of(slab, primitive, kinds.kind_of(primitive.material), kinds.data_of(primitive.material)),
+                    allowed_textures, true, with_colors);
                 draw.topology = primitive.topology;
                 draw.two_faces = slab.double_sided || primitive.topology != scene::Topology::triangle_list;
                 draw.alpha_mode = slab.alpha_mode;
@@ -226,7 +230,8 @@ void SceneGeometry::describe_vertices(std::uint32_t attributes, rhi::GraphicsPip
     for (std::uint32_t a = 0; a < attribute_count; ++a) {
         if ((attributes & (1u << a)) == 0) continue;
         pipeline.vertex_buffers.push_back({.stride = attribute_bytes[a]});
-        pipeline.vertex_attributes.push_back({.location = attribute_locations[a], .buffer = slot++, .offset = 0, .format = attribute_formats[a]});
+        pipeline.vertex_attributes.push_back(
+            {.location = attribute_locations[a], .buffer = slot++, .offset = 0, .format = attribute_formats[a]});
     }
     pipeline.vertex_buffers.push_back({.stride = instance_bytes, .per_instance = true});
     for (std::uint32_t row = 0; row < 3; ++row) {

@@ -13,8 +13,8 @@
 #include "scene/scene.h"
 
 /// @file
-/// The geometry of a scene on a device: one buffer for each vertex attribute that something needs, one for indices and one
-/// for the places of instances; and the list of what is to be drawn.
+/// The geometry of a scene on a device: one buffer for each vertex attribute that something needs, one for indices and
+/// one for the places of instances; and the list of what is to be drawn.
 ///
 ///     NACRE_TRY(auto geometry, SceneGeometry::create(device, scene, slabs, closures, kinds, all_textures, true));
 ///     for (const Draw& draw : geometry->draws()) geometry->record(list, draw, attributes);

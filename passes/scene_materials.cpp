@@ -68,8 +68,8 @@ Expected<rhi::Sampler> SceneMaterials::make_sampler(const scene::Sampler& sample
     if (sampler.mip == scene::MipFilter::none) desc.max_lod = 0.0f;
     desc.address_u = address_mode(sampler.wrap_u);
     desc.address_v = address_mode(sampler.wrap_v);
-    const bool all_linear = sampler.magnification == scene::Filter::linear && sampler.minification == scene::Filter::linear &&
-                            sampler.mip == scene::MipFilter::linear;
+    const bool all_linear = sampler.magnification == scene::Filter::linear &&
+                            sampler.minification == scene::Filter::linear && sampler.mip == scene::MipFilter::linear;
     if (all_linear) desc.max_anisotropy = anisotropy;
     desc.name = "material";
     return device_.create_sampler(desc);
@@ -158,15 +158,18 @@ Expected<void> SceneMaterials::add_closures(const scene::Scene& scene, std::uint
         result.bound.push_back(texture);
         numbers.push_back(texture.number);
     }
-    result.first_row = add_rows({reinterpret_cast<const glm::uvec4*>(closures.numbers.data()), closures.numbers.size()});
+    result.first_row =
+        add_rows({reinterpret_cast<const glm::uvec4*>(closures.numbers.data()), closures.numbers.size()});
     result.row_count = static_cast<std::uint32_t>(closures.numbers.size());
     std::vector<glm::uvec4> texture_rows;
     for (std::size_t i = 0; i < numbers.size(); i += 8) {
-        texture_rows.push_back(materials::texture_row(std::span(numbers).subspan(i, std::min<std::size_t>(8, numbers.size() - i))));
+        texture_rows.push_back(
+            materials::texture_row(std::span(numbers).subspan(i, std::min<std::size_t>(8, numbers.size() - i))));
     }
     blobs_[material].rows[materials::blob_tree_row] = {result.first_row, add_rows(texture_rows), 0, 0};
     materials::MaterialHeader header = blobs_[material].header();
-    header.type = static_cast<std::uint16_t>(static_cast<std::uint32_t>(materials::BlobType::first_tree) + closures.topology);
+    header.type =
+        static_cast<std::uint16_t>(static_cast<std::uint32_t>(materials::BlobType::first_tree) + closures.topology);
     blobs_[material].set_header(header);
     return {};
 }
@@ -206,9 +209,9 @@ Expected<void> SceneMaterials::bind_closures(std::uint32_t material, const Closu
     return {};
 }
 
-Expected<void> SceneMaterials::add_slab(const scene::Scene& scene, std::uint32_t material, const materials::SingleSlab& slab,
-                                        const materials::CustomMaterialData* custom, std::uint32_t allowed_textures,
-                                        float anisotropy) {
+Expected<void> SceneMaterials::add_slab(const scene::Scene& scene, std::uint32_t material,
+                                        const materials::SingleSlab& slab, const materials::CustomMaterialData* custom,
+                                        std::uint32_t allowed_textures, float anisotropy) {
     materials::MaterialBlob& blob = blobs_[material];
     if (custom != nullptr) {
         for (std::uint32_t i = 0; i < custom->numbers.size(); ++i) {
@@ -256,8 +259,9 @@ Expected<void> SceneMaterials::bind_slab(std::uint32_t material) {
                                                  .offset = std::uint64_t{material} * blob_stride_ * sizeof(glm::uvec4),
                                                  .size = sizeof(materials::MaterialBlob)}};
     if (slab.row_count > 0) {
-        bindings.push_back(
-            {.binding = sideband_binding, .type = rhi::BindingType::uniform_buffer, .stages = rhi::ShaderStage::fragment});
+        bindings.push_back({.binding = sideband_binding,
+                            .type = rhi::BindingType::uniform_buffer,
+                            .stages = rhi::ShaderStage::fragment});
         entries.push_back({.binding = sideband_binding,
                            .buffer = block_,
                            .offset = blobs_[material].header().sideband * sizeof(glm::uvec4),
@@ -282,7 +286,8 @@ Expected<void> SceneMaterials::bind_slab(std::uint32_t material) {
 
 Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& device, const scene::Scene& scene,
                                                                  const std::vector<materials::SingleSlab>& slabs,
-                                                                 const SceneClosures& closures, const CustomKinds& kinds,
+                                                                 const SceneClosures& closures,
+                                                                 const CustomKinds& kinds,
                                                                  const std::vector<bool>& used,
                                                                  std::uint32_t allowed_textures, float anisotropy) {
     auto result = std::unique_ptr<SceneMaterials>(new SceneMaterials(device));
@@ -311,7 +316,8 @@ Expected<std::unique_ptr<SceneMaterials>> SceneMaterials::create(rhi::Device& de
         materials::MaterialHeader header = blob.header();
         header.number = static_cast<std::uint16_t>(i);
         if (const std::uint32_t kind = kinds.kind_of(i); kind != 0) {
-            header.type = static_cast<std::uint16_t>(static_cast<std::uint32_t>(materials::BlobType::first_custom) + kind);
+            header.type =
+                static_cast<std::uint16_t>(static_cast<std::uint32_t>(materials::BlobType::first_custom) + kind);
             result->customs_.push_back({i, kinds.material(i)});
         }
         blob.set_header(header);
@@ -356,9 +362,10 @@ Expected<std::uint32_t> SceneMaterials::update() {
         const Slab& slab = slabs_[index];
         const std::uint32_t moving = blob.header().transformed ? 2 * texture_slot_count : 0;
         if (data.sideband.size() + moving != slab.row_count) {
-            return fail(ErrorCode::invalid_argument, "update material", fmt::format("{}", index),
-                        fmt::format("its sideband had {} rows and has {}", slab.row_count - moving, data.sideband.size()),
-                        "Keep the size of a sideband.");
+            return fail(
+                ErrorCode::invalid_argument, "update material", fmt::format("{}", index),
+                fmt::format("its sideband had {} rows and has {}", slab.row_count - moving, data.sideband.size()),
+                "Keep the size of a sideband.");
         }
         if (data.sideband.empty()) continue;
         NACRE_CHECK(device_.write_buffer(block_, std::as_bytes(std::span(data.sideband)),

@@ -18,10 +18,10 @@
 #include "scene/scene.h"
 
 /// @file
-/// The materials of a scene on a device, and their textures. Every material is a blob of 128 bytes (materials/material_blob.h)
-/// in one buffer, followed by what does not fit into blobs. A draw has a bind group with its material's blob and textures;
-/// hits of rays read any blob by number, and textures by their number in a table (passes/hit_materials.h). With
-/// passes/shared/ this is all that knows how a material reaches a shader.
+/// The materials of a scene on a device, and their textures. Every material is a blob of 128 bytes
+/// (materials/material_blob.h) in one buffer, followed by what does not fit into blobs. A draw has a bind group with
+/// its material's blob and textures; hits of rays read any blob by number, and textures by their number in a table
+/// (passes/hit_materials.h). With passes/shared/ this is all that knows how a material reaches a shader.
 ///
 ///     list.set_bind_group(1, materials.group(draw.material));
 
@@ -46,7 +46,9 @@ class SceneMaterials {
 
     /// The same for materials that are shaded by closures.
     [[nodiscard]] rhi::BindGroup closure_group(std::uint32_t material) const { return closures_[material].group; }
-    [[nodiscard]] rhi::BindGroupLayout closure_layout(std::uint32_t material) const { return closures_[material].layout; }
+    [[nodiscard]] rhi::BindGroupLayout closure_layout(std::uint32_t material) const {
+        return closures_[material].layout;
+    }
     [[nodiscard]] const std::vector<std::uint32_t>& closure_textures_of(std::uint32_t material) const {
         return closures_[material].textures;
     }
@@ -93,7 +95,8 @@ class SceneMaterials {
     std::uint32_t add_rows(std::span<const glm::uvec4> rows);
     // Textures and rows first, bind groups when the buffer is there.
     Expected<void> add_slab(const scene::Scene& scene, std::uint32_t material, const materials::SingleSlab& slab,
-                            const materials::CustomMaterialData* custom, std::uint32_t allowed_textures, float anisotropy);
+                            const materials::CustomMaterialData* custom, std::uint32_t allowed_textures,
+                            float anisotropy);
     Expected<void> add_closures(const scene::Scene& scene, std::uint32_t material, const ClosureMaterial& closures,
                                 float anisotropy);
     Expected<void> bind_slab(std::uint32_t material);

@@ -35,9 +35,10 @@ ShaderLibrary::ShaderLibrary(rhi::Device& device, DiskCache* cache, std::filesys
                              std::vector<EmbeddedFile> made)
     : device_(device),
       made_(std::move(made)),
-      compiler_(
-          {.embedded = {embedded_files(), generated_files(), materials::embedded_files(), materials::storage_reader_files(), rhi::embedded_files(), made_},
-           .source_folder = std::move(folder), .cache = cache}),
+      compiler_({.embedded = {embedded_files(), generated_files(), materials::embedded_files(),
+                              materials::storage_reader_files(), rhi::embedded_files(), made_},
+                 .source_folder = std::move(folder),
+                 .cache = cache}),
       pipelines_(device, compiler_) {}
 
 ShaderLibrary::~ShaderLibrary() {

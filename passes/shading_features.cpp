@@ -30,7 +30,8 @@ void derive_attributes(ShadingFeatures& features) {
     features.second_uv &= features.textures;
     if ((features.textures & ~features.second_uv) != 0) features.attributes |= attribute_bit(Attribute::uv0);
     if (features.second_uv != 0) features.attributes |= attribute_bit(Attribute::uv1);
-    if ((features.textures & texture_bit(TextureSlot::normal)) != 0) features.attributes |= attribute_bit(Attribute::tangent);
+    if ((features.textures & texture_bit(TextureSlot::normal)) != 0)
+        features.attributes |= attribute_bit(Attribute::tangent);
     features.attributes |= features.kind_attributes;
     // A kind's own rows lie behind those that move textures.
     if (features.textures == 0 && features.sideband == 0) features.transforms = false;

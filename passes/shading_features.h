@@ -53,15 +53,17 @@ struct ShadingFeatures {
 /// The texture of a slot.
 [[nodiscard]] const materials::TextureReference& texture_of(const materials::SingleSlab& slab, TextureSlot slot);
 
-/// What drawing this primitive with this slab needs, where it is of a kind of the program's own with `kind`. A texture whose coordinates (or tangents) the primitive lacks is not
-/// read; points and lines without normals are unlit, as glTF asks.
+/// What drawing this primitive with this slab needs, where it is of a kind of the program's own with `kind`. A texture
+/// whose coordinates (or tangents) the primitive lacks is not read; points and lines without normals are unlit, as glTF
+/// asks.
 [[nodiscard]] ShadingFeatures features_of(const materials::SingleSlab& slab, const scene::Primitive& primitive,
-                                          std::uint32_t kind = 0, const materials::CustomMaterialData* custom = nullptr);
+                                          std::uint32_t kind = 0,
+                                          const materials::CustomMaterialData* custom = nullptr);
 /// Whether some texture of a slab is moved.
 [[nodiscard]] bool moves_textures(const materials::SingleSlab& slab);
 
-/// The features that remain when a pass reads only some of the textures, and normals and colors only if it says so. Kinds of
-/// the program's own keep all of them: nobody knows which their functions read.
+/// The features that remain when a pass reads only some of the textures, and normals and colors only if it says so.
+/// Kinds of the program's own keep all of them: nobody knows which their functions read.
 [[nodiscard]] ShadingFeatures restricted(ShadingFeatures features, std::uint32_t textures, bool with_normals,
                                          bool with_colors);
 

@@ -11,7 +11,8 @@
 
 /// @file
 /// What rays are traced against: bottom levels hold geometry, a top level holds instances of bottom levels and is what
-/// shaders see (`accelerationStructureEXT`). Needs `Capabilities::ray_query`; docs/ray-tracing.md tells the whole story.
+/// shaders see (`accelerationStructureEXT`). Needs `Capabilities::ray_query`; docs/ray-tracing.md tells the whole
+/// story.
 ///
 ///     AccelerationStructure mesh = *device.create_acceleration_structure({
 ///         .level = AccelerationStructureLevel::bottom,
@@ -80,7 +81,8 @@ NACRE_FLAGS(InstanceFlags)
 /// One bottom level, placed in a top level.
 struct AccelerationStructureInstance {
     AccelerationStructure bottom_level{};   ///< Empty: the instance is never hit.
-    /// Object to world, three rows of four; finite. An instance whose matrix has no inverse (or one beyond 1e7) is never hit.
+    /// Object to world, three rows of four; finite. An instance whose matrix has no inverse (or one beyond 1e7) is
+    /// never hit.
     std::array<float, 12> transform{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     std::uint32_t custom_index = 0;         ///< Below 2^24; what shaders read as instance custom index.
     std::uint32_t table_offset = 0;         ///< Below 2^24; shader binding table record offset.

@@ -21,17 +21,19 @@
 /// What a backend implements. Every backend is the same list of nouns (buffer, texture, sampler, shader, bind group,
 /// pipeline, query pool, commands), so a missing feature is a missing file.
 ///
-/// The front end (rhi/*.cpp) owns handles, checks every call, tracks the state of every resource and defers destruction; a
-/// backend sees valid calls only, and translates. Its functions are called under the device's lock (one at a time),
-/// except where noted, and its objects are destroyed only when the device no longer uses them.
+/// The front end (rhi/*.cpp) owns handles, checks every call, tracks the state of every resource and defers
+/// destruction; a backend sees valid calls only, and translates. Its functions are called under the device's lock (one
+/// at a time), except where noted, and its objects are destroyed only when the device no longer uses them.
 ///
 /// What a backend can rely on:
-/// - The data members of its objects (`desc`, `spirv`, `reflection`, `layout`, ...) are filled in by the front end right
+/// - The data members of its objects (`desc`, `spirv`, `reflection`, `layout`, ...) are filled in by the front end
+/// right
 ///   after creation; a backend may set them itself too. `mapped` and `memory_bytes` are the backend's to set.
 /// - Every buffer may be copied from and to, whatever usage the user asked for: the front end adds both flags.
-/// - `set_pipeline`, `set_bind_group`, `set_push_constants`, `set_vertex_buffer` and `set_index_buffer` come in any order; what
-///   is bound counts at the draw or dispatch. A bind group may be bound at an index that the current pipeline does not use.
-///   All of it is unset at the begin and at the end of a render pass, and at the begin of each list.
+/// - `set_pipeline`, `set_bind_group`, `set_push_constants`, `set_vertex_buffer` and `set_index_buffer` come in any
+/// order; what
+///   is bound counts at the draw or dispatch. A bind group may be bound at an index that the current pipeline does not
+///   use. All of it is unset at the begin and at the end of a render pass, and at the begin of each list.
 /// - The faults of `DeviceDesc::faults` are planted by the backend, where the driver's call would fail.
 /// - Any call may return device_lost; the front end then makes no further call but `wait` and destruction.
 
@@ -115,10 +117,10 @@ struct BackendComputePipelineDesc {
 };
 
 /// How a resource is used at one point, for barriers. Uses of a buffer combine freely. A part of a texture has one use,
-/// or one of the pairs sampled | depth_stencil_read (so a sampled depth texture has the layout of a read-only depth target)
-/// and storage_read | storage_write. `generate_mips`, `clear_texture`, `clear_depth_stencil` and `fill_buffer` find their
-/// resource in copy_destination and leave it so; a resolve target is in resolve_destination from the begin of the pass.
-/// A barrier between two reads only widens the stages (or changes the layout of a texture).
+/// or one of the pairs sampled | depth_stencil_read (so a sampled depth texture has the layout of a read-only depth
+/// target) and storage_read | storage_write. `generate_mips`, `clear_texture`, `clear_depth_stencil` and `fill_buffer`
+/// find their resource in copy_destination and leave it so; a resolve target is in resolve_destination from the begin
+/// of the pass. A barrier between two reads only widens the stages (or changes the layout of a texture).
 struct ResourceState {
     ResourceUse use = ResourceUse::none;      ///< none: content undefined, never used before.
     ShaderStage stages = ShaderStage::none;   ///< For uniform, sampled and storage uses.

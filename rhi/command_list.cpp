@@ -268,8 +268,8 @@ void CommandList::generate_mips(Texture texture) {
 
 namespace {
 
-BuildAccelerationStructureCommand& record(CommandStream& stream, AccelerationStructure structure, std::span<const GeometrySource> sources,
-            bool is_update) {
+BuildAccelerationStructureCommand& record(CommandStream& stream, AccelerationStructure structure,
+                                          std::span<const GeometrySource> sources, bool is_update) {
     auto& command = stream.append<BuildAccelerationStructureCommand>(sources.size() * sizeof(GeometrySourceCommand));
     command.structure.handle = structure;
     command.count = static_cast<std::uint32_t>(sources.size());

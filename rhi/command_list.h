@@ -119,9 +119,9 @@ enum class ResourceUse : std::uint32_t {
 NACRE_FLAGS(ResourceUse)
 
 /// All uses that change content.
-inline constexpr ResourceUse writing_uses = ResourceUse::storage_write | ResourceUse::color_target |
-                                            ResourceUse::depth_stencil_write | ResourceUse::copy_destination |
-                                            ResourceUse::resolve_destination | ResourceUse::acceleration_structure_write;
+inline constexpr ResourceUse writing_uses =
+    ResourceUse::storage_write | ResourceUse::color_target | ResourceUse::depth_stencil_write |
+    ResourceUse::copy_destination | ResourceUse::resolve_destination | ResourceUse::acceleration_structure_write;
 
 /// One line of an explicit statement (see `CommandList::begin_statement`).
 struct StatedAccess {
@@ -190,15 +190,15 @@ class CommandList {
     /// Fills mips 1 and up of every layer from mip 0 with a 2x2 box filter (linear light for srgb formats).
     void generate_mips(Texture texture);
 
-    /// Builds a bottom level: one source for each of its geometries. Vertices that are not finite, and indices beyond the vertices,
-    /// make triangles that are never hit.
+    /// Builds a bottom level: one source for each of its geometries. Vertices that are not finite, and indices beyond
+    /// the vertices, make triangles that are never hit.
     void build_acceleration_structure(AccelerationStructure bottom_level, std::span<const GeometrySource> sources);
-    /// Builds a top level; the position of an instance is what shaders read as instance id. Every bottom level must be built before.
-    /// A top level is built again after any of its bottom levels was built or updated.
+    /// Builds a top level; the position of an instance is what shaders read as instance id. Every bottom level must be
+    /// built before. A top level is built again after any of its bottom levels was built or updated.
     void build_acceleration_structure(AccelerationStructure top_level,
                                       std::span<const AccelerationStructureInstance> instances);
-    /// The same for a structure that was built and made with `allow_update`: faster, for content that has moved a little. Counts and
-    /// indices must be those of the last build.
+    /// The same for a structure that was built and made with `allow_update`: faster, for content that has moved a
+    /// little. Counts and indices must be those of the last build.
     void update_acceleration_structure(AccelerationStructure bottom_level, std::span<const GeometrySource> sources);
     void update_acceleration_structure(AccelerationStructure top_level,
                                        std::span<const AccelerationStructureInstance> instances);

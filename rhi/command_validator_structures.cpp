@@ -32,15 +32,16 @@ Check CommandValidator::check_geometry_source(const char* attempted, const Accel
         if (!is_needed && !part.buffer) continue;
         const std::string subject = fmt::format("acceleration structure '{}', geometry {}", structure.name, index);
         if (!is_needed && part.kind[0] == 'i' && !geometry.index_type)
-            return problem(Rule::build_sources, attempted, "expected no index buffer for a geometry without indices, found one",
-                           "Set GeometryDesc::index_type where the structure is made, or leave the buffer out.", subject);
+            return problem(
+                Rule::build_sources, attempted, "expected no index buffer for a geometry without indices, found one",
+                "Set GeometryDesc::index_type where the structure is made, or leave the buffer out.", subject);
         Check failed;
         const BufferObject* buffer = look_up(part.buffer, attempted, part.kind, failed);
         if (!buffer) return failed;
         if (!has_all(buffer->desc.usage, BufferUsage::acceleration_structure_input))
             return problem(Rule::build_usage, attempted,
-                           fmt::format("expected {} '{}' to have usage acceleration_structure_input, found {}", part.kind,
-                                       buffer->desc.name, text_of(buffer->desc.usage)),
+                           fmt::format("expected {} '{}' to have usage acceleration_structure_input, found {}",
+                                       part.kind, buffer->desc.name, text_of(buffer->desc.usage)),
                            "Add the usage where the buffer is created.", subject);
         if (part.offset % part.alignment != 0)
             return problem(Rule::build_alignment, attempted,
@@ -79,8 +80,8 @@ Check CommandValidator::build_acceleration_structure(const BuildAccelerationStru
     if (!is_top) {
         if (command.count != desc.geometries.size())
             return problem(Rule::build_sources, attempted,
-                           fmt::format("expected one source for each of {} geometries, found {}", desc.geometries.size(),
-                                       command.count),
+                           fmt::format("expected one source for each of {} geometries, found {}",
+                                       desc.geometries.size(), command.count),
                            "Give the sources of all geometries, in their order.", subject);
         for (std::size_t i = 0; i < command.count; ++i)
             if (auto wrong = check_geometry_source(attempted, desc, i, command.sources()[i])) return wrong;

@@ -37,8 +37,8 @@ class BackendDevice;
 /// `NAME[:MODE][:CHECK]...[:lanes=N][:threads=N]`, as written on every command line.
 struct BackendSpec {
     std::string name;          ///< "vulkan", "gl", "gles", "auto".
-    /// Backend-specific; empty: the default. The first word behind the name, until the backend is known: then it may turn
-    /// out to be a check.
+    /// Backend-specific; empty: the default. The first word behind the name, until the backend is known: then it may
+    /// turn out to be a check.
     std::string mode;
     std::vector<std::string> checks{};  ///< Backend-specific: what is looked for while shaders run.
     std::uint32_t seed = 0;    ///< Of the check `hostile=N`; 0: not given.
@@ -140,8 +140,8 @@ class Device {
     Expected<QueryPool> create_query_pool(const QueryPoolDesc& desc);
     Expected<AccelerationStructure> create_acceleration_structure(const AccelerationStructureDesc& desc);
 
-    /// Destroys an object once the device no longer uses it. An empty handle is ignored; destroying twice is an error that
-    /// is reported to the message callback.
+    /// Destroys an object once the device no longer uses it. An empty handle is ignored; destroying twice is an error
+    /// that is reported to the message callback.
     void destroy(Buffer object);
     void destroy(Texture object);
     void destroy(Sampler object);
@@ -164,8 +164,8 @@ class Device {
     Expected<BindGroupLayoutDesc> describe(BindGroupLayout layout) const;
 
     // Content. Writes are copied at the call and take effect before the next submission; reads wait for all
-    // submitted work. Buffers need no usage flag for it; textures need copy_destination to be written and copy_source to
-    // be read.
+    // submitted work. Buffers need no usage flag for it; textures need copy_destination to be written and copy_source
+    // to be read.
     Expected<void> write_buffer(Buffer buffer, std::span<const std::byte> data, std::uint64_t offset = 0);
     template <typename T>
     Expected<void> write_buffer(Buffer buffer, std::span<const T> data, std::uint64_t offset = 0) {

@@ -133,7 +133,8 @@ Expected<std::unique_ptr<Device>> Instance::create_device(const DeviceDesc& desc
     const auto attempt = [&](Backend& backend, BackendSpec wanted) -> Expected<std::unique_ptr<Device>> {
         const auto modes = backend.modes();
         const auto is_check = [&](std::string_view word) {
-            return std::ranges::any_of(backend.checks(), [&](const Backend::Mode& check) { return check.name == word; });
+            return std::ranges::any_of(backend.checks(),
+                                       [&](const Backend::Mode& check) { return check.name == word; });
         };
         if (is_check(wanted.mode)) {
             wanted.checks.insert(wanted.checks.begin(), wanted.mode);

@@ -301,12 +301,13 @@ Check check_acceleration_structure(const AccelerationStructureDesc& desc, const 
     const bool is_top = desc.level == AccelerationStructureLevel::top;
     if (is_top != desc.geometries.empty() || is_top != (desc.max_instances > 0) ||
         desc.max_instances > max_structure_instances || desc.geometries.size() > max_structure_geometries)
-        return problem(Rule::acceleration_structure_level, ErrorCode::invalid_argument,
-                       is_top ? fmt::format("expected a top level of 1 to {} instances and no geometry, found {} and {}",
-                                            max_structure_instances, desc.max_instances, desc.geometries.size())
-                              : fmt::format("expected a bottom level of 1 to {} geometries and no instances, found {} and {}",
-                                            max_structure_geometries, desc.geometries.size(), desc.max_instances),
-                       "Put geometry into bottom levels, and instances of them into top levels.");
+        return problem(
+            Rule::acceleration_structure_level, ErrorCode::invalid_argument,
+            is_top ? fmt::format("expected a top level of 1 to {} instances and no geometry, found {} and {}",
+                                 max_structure_instances, desc.max_instances, desc.geometries.size())
+                   : fmt::format("expected a bottom level of 1 to {} geometries and no instances, found {} and {}",
+                                 max_structure_geometries, desc.geometries.size(), desc.max_instances),
+            "Put geometry into bottom levels, and instances of them into top levels.");
     std::uint64_t primitives = 0;
     for (std::size_t i = 0; i < desc.geometries.size(); ++i) {
         const GeometryDesc& geometry = desc.geometries[i];

@@ -49,7 +49,8 @@ class PipelineReloader {
     PipelineReloader(const PipelineReloader&) = delete;
     PipelineReloader& operator=(const PipelineReloader&) = delete;
 
-    /// Makes a pipeline now. The shaders of `desc` are left empty; so is `fragment` for pipelines that only write depth.
+    /// Makes a pipeline now. The shaders of `desc` are left empty; so is `fragment` for pipelines that only write
+    /// depth.
     Expected<ReloadableGraphicsPipeline> add(const GraphicsPipelineDesc& desc, const ShaderSource& vertex,
                                              const std::optional<ShaderSource>& fragment);
     Expected<ReloadableComputePipeline> add(const ComputePipelineDesc& desc, const ShaderSource& shader);

@@ -157,7 +157,8 @@ class Module {
         return is_constant ? found->operand(2) : 0;
     }
 
-    /// Bytes of a type laid out by its Offset, ArrayStride and MatrixStride decorations; nothing for the unbounded tail.
+    /// Bytes of a type laid out by its Offset, ArrayStride and MatrixStride decorations; nothing for the unbounded
+    /// tail.
     std::uint64_t size(std::uint32_t type, std::uint32_t matrix_stride = 0, bool row_major = false) {
         const auto found = find(type);
         if (!found) return 0;
@@ -186,7 +187,9 @@ class Module {
             if (!found) return;
             switch (static_cast<spv::Op>(found->opcode())) {
                 case spv::Op::OpTypeFloat: variable.kind = FormatKind::floating; return;
-                case spv::Op::OpTypeInt: variable.kind = found->operand(2) ? FormatKind::sint : FormatKind::uint; return;
+                case spv::Op::OpTypeInt:
+                    variable.kind = found->operand(2) ? FormatKind::sint : FormatKind::uint;
+                    return;
                 case spv::Op::OpTypeVector: variable.components = found->operand(2); break;
                 case spv::Op::OpTypeMatrix: variable.locations *= found->operand(2); break;
                 case spv::Op::OpTypeArray: variable.locations *= std::max(constant(found->operand(2)), 1u); break;
@@ -204,7 +207,8 @@ class Module {
     [[nodiscard]] const std::vector<std::uint32_t>& composites() const { return composites_; }
 
     struct Reachable {
-        std::unordered_set<std::uint32_t> named;  ///< Ids that instructions name (and some literals that look like ids).
+        std::unordered_set<std::uint32_t>
+            named;  ///< Ids that instructions name (and some literals that look like ids).
         bool discards = false;
     };
     /// What the functions that an entry point calls, directly or not, refer to.
@@ -325,13 +329,15 @@ class Reflector {
             const ShaderStage stage = stage_of(static_cast<spv::ExecutionModel>(candidate.operand(0)));
             const std::string found = candidate.text(2);
             if (found == entry_point_ && stage == stage_) entry_ = candidate;
-            others.push_back(fmt::format("'{}' ({})", found, stage == ShaderStage::none ? "another" : stage_name(stage)));
+            others.push_back(
+                fmt::format("'{}' ({})", found, stage == ShaderStage::none ? "another" : stage_name(stage)));
         }
         if (entry_) return {};
-        return reject(ErrorCode::shader_compile,
-                      fmt::format("there is no entry point '{}' for the {} stage; the module has {}", entry_point_,
-                                  stage_name(stage_), others.empty() ? "none" : fmt::format("{}", fmt::join(others, ", "))),
-                      "Set ShaderDesc::stage and ShaderDesc::entry_point to one that it has.");
+        return reject(
+            ErrorCode::shader_compile,
+            fmt::format("there is no entry point '{}' for the {} stage; the module has {}", entry_point_,
+                        stage_name(stage_), others.empty() ? "none" : fmt::format("{}", fmt::join(others, ", "))),
+            "Set ShaderDesc::stage and ShaderDesc::entry_point to one that it has.");
     }
 
     void read_capabilities() {
@@ -421,7 +427,8 @@ class Reflector {
         for (int depth = 0; depth < 64; ++depth) {
             const auto found = module_.find(type);
             if (!found) return {};
-            if (Module::is(*found, spv::Op::OpTypeArray)) count = saturating_multiply(count, module_.constant(found->operand(2)));
+            if (Module::is(*found, spv::Op::OpTypeArray))
+                count = saturating_multiply(count, module_.constant(found->operand(2)));
             else if (Module::is(*found, spv::Op::OpTypeRuntimeArray)) count = 0;
             else break;
             type = found->operand(1);
@@ -514,8 +521,8 @@ class Reflector {
         if (!is_same_resource(shared->type, binding.type) || shared->count != binding.count ||
             shared->dimension != binding.dimension || shared->multisampled != binding.multisampled)
             return reject(ErrorCode::shader_compile,
-                          fmt::format("'{}' and '{}' share set {}, binding {}, but are of different kinds", shared->name,
-                                      binding.name, binding.set, binding.binding),
+                          fmt::format("'{}' and '{}' share set {}, binding {}, but are of different kinds",
+                                      shared->name, binding.name, binding.set, binding.binding),
                           "Give one of them another binding number.");
         shared->type = union_of(shared->type, binding.type);
         shared->block_size = std::max(shared->block_size, binding.block_size);
@@ -531,7 +538,9 @@ class Reflector {
             if (storage == spv::StorageClass::Input) read_interface_variable(*variable, result_.inputs);
             if (storage == spv::StorageClass::Output) read_interface_variable(*variable, result_.outputs);
         }
-        const auto order = [](const ReflectedVariable& v) { return std::tuple(v.location, v.index, v.first_component); };
+        const auto order = [](const ReflectedVariable& v) {
+            return std::tuple(v.location, v.index, v.first_component);
+        };
         std::ranges::sort(result_.inputs, {}, order);
         std::ranges::sort(result_.outputs, {}, order);
     }

@@ -66,8 +66,8 @@ struct ShaderReflection {
 ///
 ///     NACRE_TRY(ShaderReflection reflection, reflect(words, ShaderStage::compute, "main", "cull.comp"));
 ///
-/// Errors: shader_compile with the word offset and the validator's text, also where the module has no such entry point or
-/// has it for another stage; unsupported for capabilities and kinds of resources that no backend takes.
+/// Errors: shader_compile with the word offset and the validator's text, also where the module has no such entry point
+/// or has it for another stage; unsupported for capabilities and kinds of resources that no backend takes.
 Expected<ShaderReflection> reflect(std::span<const std::uint32_t> spirv, ShaderStage stage,
                                    const std::string& entry_point = "main", const std::string& name = {});
 

@@ -61,7 +61,8 @@ std::optional<std::string_view> included_name(std::string_view line) {
 
 bool is_identifier(std::string_view name) {
     const auto is_part = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
-    return !name.empty() && !std::isdigit(static_cast<unsigned char>(name.front())) && std::ranges::all_of(name, is_part);
+    return !name.empty() && !std::isdigit(static_cast<unsigned char>(name.front())) &&
+           std::ranges::all_of(name, is_part);
 }
 
 /// What a file on disk was like when it was read, to notice that it has changed.

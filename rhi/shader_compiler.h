@@ -49,9 +49,9 @@ struct ShaderSource {
 };
 
 /// Compiles GLSL 4.60 for Vulkan to SPIR-V 1.3, with `#include "path"` (relative to the including file, then from the
-/// root) and `#pragma once`. `GL_GOOGLE_include_directive` and `#version 460` are implied, and one of NACRE_VERTEX_STAGE,
-/// NACRE_FRAGMENT_STAGE and NACRE_COMPUTE_STAGE is defined; what of the language runs on all backends stands in
-/// docs/writing-shaders.md. Thread-safe; compiles on as many threads as call it.
+/// root) and `#pragma once`. `GL_GOOGLE_include_directive` and `#version 460` are implied, and one of
+/// NACRE_VERTEX_STAGE, NACRE_FRAGMENT_STAGE and NACRE_COMPUTE_STAGE is defined; what of the language runs on all
+/// backends stands in docs/writing-shaders.md. Thread-safe; compiles on as many threads as call it.
 ///
 /// A cache entry's key holds the text of every file, all definitions and options and the versions of the libraries;
 /// a damaged entry is rebuilt. Includes are found by a scan of the text, so their names cannot come from macros.

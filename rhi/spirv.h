@@ -71,9 +71,9 @@ Expected<std::span<const std::uint32_t>> words_of(std::span<const std::byte> byt
 /// Header (size, magic number, byte order, version, id bound) and the word count of every instruction.
 Expected<void> check_structure(std::span<const std::uint32_t> words, std::string_view name);
 
-/// All rules: `check_structure`, the capabilities that Nacre's shaders may use, then the validator of SPIRV-Tools with the
-/// rules of Vulkan 1.1 (or later, as the module's version demands). Modules found valid are remembered by
-/// their hash for the life of the process. Errors: shader_compile with the word offset, and the GLSL line where the module
+/// All rules: `check_structure`, the capabilities that Nacre's shaders may use, then the validator of SPIRV-Tools with
+/// the rules of Vulkan 1.1 (or later, as the module's version demands). Modules found valid are remembered by their
+/// hash for the life of the process. Errors: shader_compile with the word offset, and the GLSL line where the module
 /// has line tables; unsupported for capabilities. Thread-safe.
 Expected<void> validate(std::span<const std::uint32_t> words, std::string_view name);
 

@@ -41,7 +41,9 @@ class StateTracker {
     /// What the current scope has touched so far.
     [[nodiscard]] const std::vector<BufferObject*>& scope_buffers() const { return scope_buffers_; }
     [[nodiscard]] const std::vector<TextureObject*>& scope_textures() const { return scope_textures_; }
-    [[nodiscard]] const std::vector<AccelerationStructureObject*>& scope_structures() const { return scope_structures_; }
+    [[nodiscard]] const std::vector<AccelerationStructureObject*>& scope_structures() const {
+        return scope_structures_;
+    }
     /// All that the submission has changed the state of.
     [[nodiscard]] const std::vector<BufferObject*>& touched_buffers() const { return touched_buffers_; }
     [[nodiscard]] const std::vector<TextureObject*>& touched_textures() const { return touched_textures_; }

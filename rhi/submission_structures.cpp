@@ -41,13 +41,14 @@ SubmissionWalk::Step SubmissionWalk::build(CommandHeader& header, BuildAccelerat
     AccelerationStructureObject* structure = look_up(command.structure.handle, attempted, "acceleration structure");
     if (!structure) return std::move(problem_);
     if (command.is_update && structure->content.builds == 0)
-        return misuse(Rule::structure_update, attempted,
-                      fmt::format("expected '{}' to be built before it is updated, found no build", structure->desc.name),
-                      "Build it first.");
+        return misuse(
+            Rule::structure_update, attempted,
+            fmt::format("expected '{}' to be built before it is updated, found no build", structure->desc.name),
+            "Build it first.");
     if (command.is_update && structure->content.count != command.count)
         return misuse(Rule::structure_update, attempted,
-                      fmt::format("expected the {} instances of the last build of '{}', found {}", structure->content.count,
-                                  structure->desc.name, command.count),
+                      fmt::format("expected the {} instances of the last build of '{}', found {}",
+                                  structure->content.count, structure->desc.name, command.count),
                       "Build it anew where the number of instances changes.");
     command.structure.object = structure->backend.get();
     tracker_.begin_scope();

@@ -31,11 +31,11 @@ struct PlannedPage {
 };
 
 /// Groups textures into at most `max_pages` pages. Textures of equal kind always share one. Where that takes too many
-/// pages, those pages are merged, two at a time, whose merger costs the least memory: the page takes the larger width and
-/// height; formats that differ, or that cannot be color targets (compressed ones), become rgba16_float. Pages can merge
-/// when they have one sampler, and both a full chain of mips or both none. Error: unsupported, with the kinds that are left
-/// over and what to change, also where the device cannot draw rgba16_float, or where a page has more layers than
-/// the device.
+/// pages, those pages are merged, two at a time, whose merger costs the least memory: the page takes the larger width
+/// and height; formats that differ, or that cannot be color targets (compressed ones), become rgba16_float. Pages can
+/// merge when they have one sampler, and both a full chain of mips or both none. Error: unsupported, with the kinds
+/// that are left over and what to change, also where the device cannot draw rgba16_float, or where a page has more
+/// layers than the device.
 Expected<std::vector<PlannedPage>> plan_pages(std::span<const PageKind> requests, std::uint32_t max_pages,
                                               const Capabilities& capabilities);
 

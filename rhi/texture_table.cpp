@@ -36,7 +36,9 @@ struct Page {
 
 struct LayoutLess {
     bool operator()(BindGroupLayout a, BindGroupLayout b) const { return number(a) < number(b); }
-    static std::uint64_t number(BindGroupLayout layout) { return std::uint64_t{layout.generation} << 24 | layout.index; }
+    static std::uint64_t number(BindGroupLayout layout) {
+        return std::uint64_t{layout.generation} << 24 | layout.index;
+    }
 };
 
 }  // namespace
@@ -78,8 +80,11 @@ struct TextureTable::State {
     }
 
     Expected<void> make_objects() {
-        NACRE_TRY(empty_texture, device.create_texture({.format = Format::rgba8_unorm, .width = 1, .height = 1,
-                                                        .layers = uses_pages ? 2u : 1u, .usage = TextureUsage::sampled | TextureUsage::copy_destination,
+        NACRE_TRY(empty_texture, device.create_texture({.format = Format::rgba8_unorm,
+                                                        .width = 1,
+                                                        .height = 1,
+                                                        .layers = uses_pages ? 2u : 1u,
+                                                        .usage = TextureUsage::sampled | TextureUsage::copy_destination,
                                                         .name = desc.name + ": nothing"}));
         const std::byte black[4]{};
         for (std::uint32_t layer = 0; layer < (uses_pages ? 2u : 1u); ++layer)
@@ -149,7 +154,8 @@ struct TextureTable::State {
         }
         Page page{.kind = planned.kind};
         // At least 2 layers: a texture of one is no array on every device.
-        page.capacity = std::min(std::max(std::bit_ceil(count), 2u), std::max(device.capabilities().max_texture_layers, 2u));
+        page.capacity =
+            std::min(std::max(std::bit_ceil(count), 2u), std::max(device.capabilities().max_texture_layers, 2u));
         page.layers.resize(page.capacity);
         TextureUsage usage = TextureUsage::sampled | TextureUsage::copy_destination;
         if (planned.is_merged) usage |= TextureUsage::color_target;
@@ -181,9 +187,10 @@ struct TextureTable::State {
             NACRE_TRY(const GraphicsPipeline pipeline, resample_pipeline(page.kind.format));
             NACRE_TRY(const BindGroupLayout layout, device.bind_group_layout(pipeline, 0));
             NACRE_TRY(const BindGroup group,
-                      device.create_bind_group({.layout = layout,
-                                                .entries = {{.binding = 0, .texture = entry.texture, .sampler = entry.sampler}},
-                                                .name = desc.name + ": resample"}));
+                      device.create_bind_group(
+                          {.layout = layout,
+                           .entries = {{.binding = 0, .texture = entry.texture, .sampler = entry.sampler}},
+                           .name = desc.name + ": resample"}));
             list.begin_render_pass({.color = {{.view = TextureView::subresource(page.texture, mip, layer),
                                                .load = LoadOperation::discard}},
                                     .name = "resample"});
@@ -247,7 +254,8 @@ Expected<TextureTable> TextureTable::create(Device& device, const TextureTableDe
     if (desc.capacity == 0 || desc.capacity > most_textures)
         return reject(fmt::format("the capacity is {}", desc.capacity), fmt::format("Use 1 to {}.", most_textures));
     if (desc.max_pages == 0 || desc.max_pages > most_pages)
-        return reject(fmt::format("the number of pages is {}", desc.max_pages), fmt::format("Use 1 to {}.", most_pages));
+        return reject(fmt::format("the number of pages is {}", desc.max_pages),
+                      fmt::format("Use 1 to {}.", most_pages));
     const Capabilities& capabilities = device.capabilities();
     if (desc.set >= capabilities.max_bind_groups)
         return reject(fmt::format("the set is {}", desc.set),
@@ -321,8 +329,9 @@ Expected<void> TextureTable::update() {
 Expected<BindGroup> TextureTable::bind_group(BindGroupLayout layout) {
     State& state = *state_;
     if (const auto found = state.groups.find(layout); found != state.groups.end()) return found->second;
-    NACRE_TRY(const BindGroup group, state.device.create_bind_group(
-                                         {.layout = layout, .entries = state.group_entries(), .name = state.desc.name}));
+    NACRE_TRY(
+        const BindGroup group,
+        state.device.create_bind_group({.layout = layout, .entries = state.group_entries(), .name = state.desc.name}));
     return state.groups[layout] = group;
 }
 

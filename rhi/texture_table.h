@@ -23,8 +23,8 @@
 /// arrays that the shader chooses by constant indices, so it works on GLES 3.1 and with any Vulkan driver. Textures of
 /// one size, format, number of mips and sampler share a page, and are sampled exactly as if they were
 /// bound alone. Where a table has more kinds than pages, kinds are merged (`plan_pages` in rhi/texture_pages.h tells
-/// how): smaller textures are enlarged to the size of the largest, mip by mip, so that they keep their look when minified and
-/// lose nothing but some sharpness of nearest filtering when magnified.
+/// how): smaller textures are enlarged to the size of the largest, mip by mip, so that they keep their look when
+/// minified and lose nothing but some sharpness of nearest filtering when magnified.
 ///
 /// Not thread-safe; the device's other users need no care.
 

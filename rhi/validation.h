@@ -28,8 +28,8 @@ struct ValidationRule {
 /// All messages that the validation layer can give, in the order of their numbers. Each has a test.
 std::span<const ValidationRule> validation_rules();
 
-/// What is found while shaders run, on backends that look for it (see `BackendSpec::checks`); numbers are never used again
-/// for something else.
+/// What is found while shaders run, on backends that look for it (see `BackendSpec::checks`); numbers are never used
+/// again for something else.
 enum class ShaderFault : std::uint16_t {
     not_a_number = 801, infinity, division_by_zero, index_range, uninitialized_read, data_race, nonuniform_derivative,
     host_access = 820, unstated_access,

@@ -16,8 +16,8 @@
 namespace nacre {
 
 std::vector<std::unique_ptr<rhi::Backend>> all_backends() {
-    // Mesa's software drivers filter textures with shortcuts that are not conformant, and not the same ones on Vulkan and
-    // OpenGL, unless they are told not to before they are loaded. Devices of their own do not look at this.
+    // Mesa's software drivers filter textures with shortcuts that are not conformant, and not the same ones on Vulkan
+    // and OpenGL, unless they are told not to before they are loaded. Devices of their own do not look at this.
     setenv("GALLIVM_PERF", "no_quad_lod,no_aos_sampling,no_brilinear,no_rho_approx", 0);
     std::vector<std::unique_ptr<rhi::Backend>> backends;
 #ifdef NACRE_HAS_CPU

@@ -37,7 +37,8 @@ struct Vignette {
 
     // Says what the pass reads and writes, and what it does in each frame. No barrier is ever written.
     Vignette(FrameGraph& graph, TextureId input) : picture(input) {
-        result = graph.add_texture({.format = Format::rgba8_unorm, .width = width, .height = height, .name = "vignette"});
+        result =
+            graph.add_texture({.format = Format::rgba8_unorm, .width = width, .height = height, .name = "vignette"});
         PassDeclaration pass = graph.add_pass("vignette");
         pass.uses(picture, ResourceUse::sampled).uses(result, ResourceUse::storage_write);
         pass.records([this](PassContext& frame) {

@@ -139,8 +139,8 @@ Scene materials_scene() {
         MaterialDescription material = dielectric(std::string(names[i]), glm::vec3(0.5f), 0.5f);
         material.tree = std::make_shared<const materials::Tree>(*std::move(tree));
         const std::uint32_t index = add_material(scene, std::move(material));
-        const glm::vec3 position(static_cast<float>(i % columns) - 0.5f * (columns - 1), 1.5f - static_cast<float>(i / columns),
-                                 0.0f);
+        const glm::vec3 position(static_cast<float>(i % columns) - 0.5f * (columns - 1),
+                                 1.5f - static_cast<float>(i / columns), 0.0f);
         place(scene, std::string(names[i]), ball, index, moved_to(position));
     }
     const std::uint32_t floor = add_material(scene, dielectric("floor", {0.35f, 0.36f, 0.38f}, 0.6f));
@@ -358,7 +358,8 @@ static constexpr BuiltinScene builtin_scenes[] = {
     {"builtin:cornell", "The Cornell box with two blocks, a copper and a glossy ball.", cornell_scene},
     {"builtin:grid250k", "A landscape of 250,632 triangles in 16 meshes under a sun.", grid_scene},
     {"builtin:alpha", "Masked and blended leaves and three colored panes that must be sorted.", alpha_scene},
-    {"builtin:materials", "Balls of layered materials: silks, jade and gold, skin, carbon, dusty paint, cloth.", materials_scene},
+    {"builtin:materials", "Balls of layered materials: silks, jade and gold, skin, carbon, dusty paint, cloth.",
+     materials_scene},
     {"builtin:lights", "A directional, a point and a spot light, each with its own shadows.", lights_scene},
 };
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What nearly every test includes, compiled once for all of them: a fifth of the time of a clean build. Tests include what
-// they use all the same.
+// What nearly every test includes, compiled once for all of them: a fifth of the time of a clean build. Tests include
+// what they use all the same.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>

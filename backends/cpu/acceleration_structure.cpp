@@ -17,8 +17,8 @@ Expected<std::unique_ptr<rhi::BackendAccelerationStructure>> CpuAccelerationStru
         made->mesh_ = std::make_shared<RayMesh>(device, desc.geometries, desc.allow_update, desc.prefer);
     return made;
 } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::out_of_memory, "create acceleration structure", "'" + desc.name + "'", "there is no memory for it",
-                "Free other resources.");
+    return fail(ErrorCode::out_of_memory, "create acceleration structure", "'" + desc.name + "'",
+                "there is no memory for it", "Free other resources.");
 }
 
 void CpuAccelerationStructure::build(const rhi::BuildAccelerationStructureCommand& command) {

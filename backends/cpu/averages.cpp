@@ -40,8 +40,8 @@ void add_weighted(std::span<LinearTexel> sum, std::span<const LinearTexel> texel
         for (std::size_t c = 0; c < 4; ++c) sum[x][c] += texels[x][c] * weight;
 }
 
-/// In the middle, as everywhere where sizes are powers of two, by the operations of Mesa's software drivers; elsewhere without their
-/// loss of digits where b is much smaller than a.
+/// In the middle, as everywhere where sizes are powers of two, by the operations of Mesa's software drivers; elsewhere
+/// without their loss of digits where b is much smaller than a.
 float between(float a, float b, float weight) {
     return weight == 0.5f ? a + weight * (b - a) : a * (1.0f - weight) + b * weight;
 }
@@ -52,8 +52,8 @@ struct SourceRows {
     float row_weight, slice_weight;
 };
 
-/// Makes one row of a mip of the up to four rows above it: interpolates along x, then y, then z, which is also the order of
-/// Mesa's software drivers, so that results have the same bits.
+/// Makes one row of a mip of the up to four rows above it: interpolates along x, then y, then z, which is also the
+/// order of Mesa's software drivers, so that results have the same bits.
 class MipRow {
   public:
     MipRow(rhi::Format format, std::uint32_t texel_bytes, std::span<const Taps> columns)

@@ -34,10 +34,12 @@ Expected<std::unique_ptr<rhi::BackendBuffer>> CpuBuffer::create(const std::share
     if (checks & (check_sanitize | check_hostile)) {
         const bool is_device = desc.memory == rhi::MemoryKind::device;
         // What the host writes into mapped memory is not seen: all of it counts as written.
-        buffer->checked = std::make_unique<CheckedMemory>(fmt::format("buffer '{}'", desc.name), buffer->data(), desc.size, !is_device);
+        buffer->checked = std::make_unique<CheckedMemory>(fmt::format("buffer '{}'", desc.name), buffer->data(),
+                                                          desc.size, !is_device);
         if (is_device || checks & check_hostile) poison(buffer->data(), desc.size);
     } else if (checks) {
-        buffer->checked = std::make_unique<CheckedMemory>(fmt::format("buffer '{}'", desc.name), buffer->data(), desc.size, true);
+        buffer->checked =
+            std::make_unique<CheckedMemory>(fmt::format("buffer '{}'", desc.name), buffer->data(), desc.size, true);
     }
     return buffer;
 }

@@ -109,8 +109,8 @@ class Executor {
     void note_pass_begin(const rhi::BeginRenderPassCommand& command);
     void note_pass_end();
     void prepare_workgroup_checks();
-    /// What a statement does not name is kept from its commands: nothing makes them wait for it, so in the worst order they
-    /// find undefined content, and what they write is overwritten.
+    /// What a statement does not name is kept from its commands: nothing makes them wait for it, so in the worst order
+    /// they find undefined content, and what they write is overwritten.
     void begin_statement(const rhi::CommandHeader& header, const std::byte* payload);
     void end_statement();
 

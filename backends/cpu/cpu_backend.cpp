@@ -58,7 +58,9 @@ class CpuBackend : public rhi::Backend {
                                                  : ExecutionMode::fast;
         options.lanes = spec.lanes != 0 ? spec.lanes : native_lanes();
         options.threads = spec.threads;
-        const auto looks_for = [&](std::string_view check) { return std::ranges::find(spec.checks, check) != spec.checks.end(); };
+        const auto looks_for = [&](std::string_view check) {
+            return std::ranges::find(spec.checks, check) != spec.checks.end();
+        };
         options.checks = (looks_for("traps") ? check_traps : 0u) | (looks_for("sanitize") ? check_sanitize : 0u) |
                          (looks_for("hostile") ? check_hostile : 0u);
         options.seed = spec.seed;

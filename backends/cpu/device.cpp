@@ -76,7 +76,8 @@ CpuDevice::CpuDevice(const DeviceOptions& options, const rhi::BackendDeviceDesc&
 
 Expected<std::unique_ptr<rhi::BackendDevice>> CpuDevice::create(const DeviceOptions& options,
                                                                 const rhi::BackendDeviceDesc& desc) try {
-    NACRE_TRY(auto compiler, Compiler::create({.lanes = options.lanes, .mode = options.mode, .checks = options.checks}));
+    NACRE_TRY(auto compiler,
+              Compiler::create({.lanes = options.lanes, .mode = options.mode, .checks = options.checks}));
     std::unique_ptr<CpuDevice> device(new CpuDevice(options, desc, std::move(compiler)));
     if (log_is_on(LogLevel::debug))
         log_message(LogLevel::debug,
@@ -194,7 +195,8 @@ void CpuDevice::check_host_access(const char* attempted, const rhi::BackendBuffe
         FoundFault fault;
         fault.attempted = attempted;
         fault.subject = fmt::format("'{}'", buffer.desc.name);
-        fault.reason = fmt::format("expected submission {}, which uses it, to be waited for, found that nobody did", serial);
+        fault.reason =
+            fmt::format("expected submission {}, which uses it, to be waited for, found that nobody did", serial);
         return fault;
     });
     faults_seen_.send();

@@ -36,7 +36,8 @@ MemoryBlock::MemoryBlock(std::shared_ptr<HostMemory> memory, std::uint64_t size)
         void* pages = mmap(nullptr, allocated, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
         data_ = pages == MAP_FAILED ? nullptr : static_cast<std::byte*>(pages);
 #ifdef MADV_HUGEPAGE
-        // Accesses in two dimensions touch many pages. Only a hint: where the system knows no large pages nothing changes.
+        // Accesses in two dimensions touch many pages. Only a hint: where the system knows no large pages nothing
+        // changes.
         if (data_ && allocated >= large_page_threshold) madvise(pages, allocated, MADV_HUGEPAGE);
 #endif
     } else {

@@ -13,9 +13,9 @@
 /// Texels lie in rows without padding between texels: texel (x, y, z) of sample s, layer l and mip m is at
 ///     levels[m].data + l * levels[m].layer_stride + s * levels[m].sample_stride + z * levels[m].slice_stride
 ///                    + y * levels[m].row_stride + x * block_bytes
-/// Block-compressed formats lie there as blocks (x and y counted in blocks). Depth-stencil formats lie as two planes: depth
-/// (d24 as 32 bits with the value in the low 24, d16 as 16, d32 as float) in the levels, stencil (8 bits) in `stencil_levels`.
-/// Texel buffers are views of dimension d1 with one mip.
+/// Block-compressed formats lie there as blocks (x and y counted in blocks). Depth-stencil formats lie as two planes:
+/// depth (d24 as 32 bits with the value in the low 24, d16 as 16, d32 as float) in the levels, stencil (8 bits) in
+/// `stencil_levels`. Texel buffers are views of dimension d1 with one mip.
 
 namespace nacre::cpu {
 
@@ -41,7 +41,8 @@ enum class DirectTexels : std::uint32_t {
     unorm8x4,      ///< rgba8_unorm
 };
 
-/// A part of a texture in one dimension and format. Levels count from the view's first mip, layers from its first layer.
+/// A part of a texture in one dimension and format. Levels count from the view's first mip, layers from its first
+/// layer.
 struct ImageView {
     rhi::Format format = rhi::Format::undefined;
     rhi::ViewDimension dimension = rhi::ViewDimension::d2;

@@ -10,7 +10,8 @@
 #include "backends/cpu/shader_interface.h"
 
 /// @file
-/// Compiled shaders, with what the rest of the backend has to know about them. Code lives as long as the program's `code`.
+/// Compiled shaders, with what the rest of the backend has to know about them. Code lives as long as the program's
+/// `code`.
 
 namespace nacre::cpu {
 
@@ -46,7 +47,7 @@ struct VertexProgram {
     std::vector<VertexOutput> outputs;             ///< Sorted by location and component.
     bool writes_point_size = false;
     std::uint32_t clip_distances = 0, cull_distances = 0;
-    bool has_side_effects = false;                 ///< Stores to buffers or images: every vertex runs exactly once an index.
+    bool has_side_effects = false;  ///< Stores to buffers or images: every vertex runs exactly once an index.
     bool in_double = false;                        ///< Also writes VertexBatch::doubles.
     std::vector<NarrowedOperation> narrowed;
     std::string name;
@@ -69,11 +70,13 @@ struct FragmentProgram {
     FragmentFunction run = nullptr;
     std::vector<FragmentInput> inputs;
     std::vector<FragmentOutput> outputs;
-    bool early_tests = false;         ///< layout(early_fragment_tests): depth and stencil are tested, and written, before it runs.
+    bool early_tests =
+        false;  ///< layout(early_fragment_tests): depth and stencil are tested, and written, before it runs.
     bool discards = false;
     bool writes_depth = false;
     bool writes_sample_mask = false;
-    bool has_side_effects = false;    ///< Stores to buffers or images: runs after early tests only where `early_tests` says so.
+    bool has_side_effects =
+        false;  ///< Stores to buffers or images: runs after early tests only where `early_tests` says so.
     bool runs_per_sample = false;     ///< Reads gl_SampleID, gl_SamplePosition or an input declared `sample`.
     bool uses_centroid = false;
     bool in_double = false;  ///< Reads the primitive's DoublePrimitive and also writes FragmentBatch::doubles.

@@ -5,12 +5,12 @@
 #include <cstdint>
 
 /// @file
-/// The memory that compiled shaders and the rest of the backend share: plain structures whose layout the compiler writes into
-/// the code that it makes. Who changes a member here changes `compiler/interface_layout.h` with it; static
+/// The memory that compiled shaders and the rest of the backend share: plain structures whose layout the compiler
+/// writes into the code that it makes. Who changes a member here changes `compiler/interface_layout.h` with it; static
 /// assertions there hold the two together.
 ///
-/// Compiled code runs `lanes` invocations at once (4, 8 or 16). Arrays over lanes always have `max_lanes` elements, whatever
-/// the lane count, so that one layout serves all; code of N lanes touches the first N.
+/// Compiled code runs `lanes` invocations at once (4, 8 or 16). Arrays over lanes always have `max_lanes` elements,
+/// whatever the lane count, so that one layout serves all; code of N lanes touches the first N.
 
 namespace nacre::cpu {
 
@@ -22,7 +22,8 @@ class CommandChecks;
 inline constexpr std::uint32_t max_lanes = 16;
 inline constexpr std::uint32_t max_quads = max_lanes / 4;
 inline constexpr std::uint32_t max_groups = 8;          ///< rhi::most_bind_groups
-inline constexpr std::uint32_t max_color_outputs = 9;   ///< Locations 0 to 7, and location 0 index 1 (dual source) as the ninth.
+inline constexpr std::uint32_t max_color_outputs =
+    9;  ///< Locations 0 to 7, and location 0 index 1 (dual source) as the ninth.
 inline constexpr std::uint32_t dual_source_output = 8;
 inline constexpr std::uint32_t push_constant_capacity = 256;
 inline constexpr std::uint32_t most_workgroup_bytes = 65536;  ///< Of the variables of a workgroup.
@@ -44,7 +45,8 @@ static_assert(sizeof(Descriptor) == 32);
 
 /// What a running dispatch or draw tells its shaders about cancellation, and they about faults.
 struct ExecutionState {
-    /// Not zero: stop at the next loop iteration; whatever is written afterwards does not matter (watchdog, device loss).
+    /// Not zero: stop at the next loop iteration; whatever is written afterwards does not matter (watchdog, device
+    /// loss).
     std::uint32_t expired;
 };
 
@@ -58,7 +60,8 @@ struct ShaderContext {
     const CommandChecks* checks;            ///< For code that looks for faults (checks/check_interface.h); else null.
 };
 
-// ---- Compute -------------------------------------------------------------------------------------------------------------
+// ---- Compute
+// -------------------------------------------------------------------------------------------------------------
 
 /// A run of workgroups along x; the kernel runs all invocations of each, one workgroup after another.
 struct WorkgroupRange {
@@ -66,13 +69,14 @@ struct WorkgroupRange {
     std::uint32_t y, z;
     std::uint32_t count[3];        ///< gl_NumWorkGroups.
     std::uint32_t reserved;
-    /// `ComputeProgram::workgroup_bytes` bytes, aligned to 64: this thread's workgroup memory and, for kernels with barriers, the
-    /// suspended subgroups. Content does not matter.
+    /// `ComputeProgram::workgroup_bytes` bytes, aligned to 64: this thread's workgroup memory and, for kernels with
+    /// barriers, the suspended subgroups. Content does not matter.
     std::byte* memory;
 };
 using ComputeFunction = void (*)(const ShaderContext*, const WorkgroupRange*);
 
-// ---- Vertex --------------------------------------------------------------------------------------------------------------
+// ---- Vertex
+// --------------------------------------------------------------------------------------------------------------
 
 struct VertexBufferBinding {
     const std::byte* data;  ///< Null where nothing is bound.
@@ -92,9 +96,9 @@ struct VertexDraw {
 
 /// Up to `lanes` vertices of one instance.
 ///
-/// Outputs are 32-bit words, one array of lanes for each slot: outputs[slot * max_lanes + lane]. Slots 0 to 3 are gl_Position,
-/// slot 4 is gl_PointSize (1 where the shader does not write it), slots 5 to 12 are gl_ClipDistance and behind them
-/// gl_CullDistance (as many as the program says), then the user's outputs (`VertexProgram::outputs`).
+/// Outputs are 32-bit words, one array of lanes for each slot: outputs[slot * max_lanes + lane]. Slots 0 to 3 are
+/// gl_Position, slot 4 is gl_PointSize (1 where the shader does not write it), slots 5 to 12 are gl_ClipDistance and
+/// behind them gl_CullDistance (as many as the program says), then the user's outputs (`VertexProgram::outputs`).
 struct VertexBatch {
     std::uint32_t indices[max_lanes];  ///< gl_VertexIndex: vertex offset and first vertex are added already.
     std::uint32_t instance;            ///< gl_InstanceIndex: the first instance is added already.
@@ -106,7 +110,8 @@ using VertexFunction = void (*)(const ShaderContext*, const VertexDraw*, VertexB
 
 inline constexpr std::uint32_t slot_position = 0, slot_point_size = 4, slot_clip_distance = 5, first_user_slot = 13;
 
-// ---- Fragment ------------------------------------------------------------------------------------------------------------
+// ---- Fragment
+// ------------------------------------------------------------------------------------------------------------
 
 /// A value that is linear over the screen: c + dx * (x - x0) + dy * (y - y0), (x0, y0) as in PrimitiveData.
 struct alignas(16) Plane {
@@ -115,16 +120,16 @@ struct alignas(16) Plane {
 
 /// What fragment code reads of a triangle, line or point.
 ///
-/// For inputs with perspective the plane holds value / w, for noperspective inputs the value, for flat ones the bits of the
-/// provoking vertex's value in `c`. `inverse_w` is 1 / w; fragment code gets the value back as plane / inverse_w. These planes are
-/// evaluated with fused multiplications, first along x: fma(dy, y, fma(dx, x, c)); `depth` as (c + dx * x) + dy * y, as the depth test
-/// does.
+/// For inputs with perspective the plane holds value / w, for noperspective inputs the value, for flat ones the bits of
+/// the provoking vertex's value in `c`. `inverse_w` is 1 / w; fragment code gets the value back as plane / inverse_w.
+/// These planes are evaluated with fused multiplications, first along x: fma(dy, y, fma(dx, x, c)); `depth` as (c + dx
+/// * x) + dy * y, as the depth test does.
 struct alignas(16) PrimitiveData {
     float x0, y0;                ///< Window coordinates that `depth` is relative to.
     std::uint32_t primitive_id;  ///< gl_PrimitiveID
     std::uint32_t front_facing;  ///< 0 or 1
-    /// Window coordinates that `inverse_w` and the varyings are relative to. Points, whose values are the same everywhere: the left
-    /// upper corner, for gl_PointCoord.
+    /// Window coordinates that `inverse_w` and the varyings are relative to. Points, whose values are the same
+    /// everywhere: the left upper corner, for gl_PointCoord.
     float origin_x, origin_y;
     float inverse_point_size;    ///< Points: 1 / size.
     std::uint32_t layer;         ///< gl_Layer
@@ -162,13 +167,13 @@ struct FragmentDoubles {
     alignas(64) double colors[max_color_outputs][4][max_lanes];
 };
 
-/// Up to `lanes` / 4 quads of 2x2 pixels, of one primitive or of several. Lane 4 * q + i is pixel (x[q] + (i & 1), y[q] + (i >> 1)).
-/// Quads that are not used repeat a valid primitive and have no live lane.
+/// Up to `lanes` / 4 quads of 2x2 pixels, of one primitive or of several. Lane 4 * q + i is pixel (x[q] + (i & 1), y[q]
+/// + (i >> 1)). Quads that are not used repeat a valid primitive and have no live lane.
 struct FragmentBatch {
     const PrimitiveData* primitives[max_quads];
     std::int32_t x[max_quads], y[max_quads];  ///< Left upper pixel of each quad, even.
-    /// In: lanes whose results count, one bit each; the others of a quad are helper invocations. Out: less those that the shader
-    /// discarded or demoted.
+    /// In: lanes whose results count, one bit each; the others of a quad are helper invocations. Out: less those that
+    /// the shader discarded or demoted.
     std::uint32_t live;
     std::uint32_t sample_index;  ///< gl_SampleID, where the program runs for each sample.
     std::uint32_t samples;       ///< Of the targets: 1 or 4.
@@ -186,17 +191,18 @@ struct FragmentBatch {
 };
 using FragmentFunction = void (*)(const ShaderContext*, FragmentBatch*, std::uint32_t batch_count);
 
-// ---- Images --------------------------------------------------------------------------------------------------------------
+// ---- Images
+// --------------------------------------------------------------------------------------------------------------
 
 /// What is asked of an image, as bits; the first four are exclusive.
 enum class ImageOperation : std::uint32_t {
-    sample,            ///< Filtered read. Level of detail by the `lod_*` flags.
-    gather,            ///< textureGather of `component`; with `compare`, of the comparison.
-    fetch,             ///< texelFetch: integer coordinates, level in `lod` (as an integer), sample in `sample`.
-    load,              ///< imageLoad: integer coordinates of the view's first mip.
-    store,             ///< imageStore of `texel`.
-    query_lod,         ///< textureQueryLod: result[0] mip that would be used, result[1] level of detail before clamping.
-    atomic,            ///< imageAtomic*: see `ImageArguments::atomic`; the old value in result[0].
+    sample,     ///< Filtered read. Level of detail by the `lod_*` flags.
+    gather,     ///< textureGather of `component`; with `compare`, of the comparison.
+    fetch,      ///< texelFetch: integer coordinates, level in `lod` (as an integer), sample in `sample`.
+    load,       ///< imageLoad: integer coordinates of the view's first mip.
+    store,      ///< imageStore of `texel`.
+    query_lod,  ///< textureQueryLod: result[0] mip that would be used, result[1] level of detail before clamping.
+    atomic,     ///< imageAtomic*: see `ImageArguments::atomic`; the old value in result[0].
 };
 enum ImageFlags : std::uint32_t {
     image_operation_mask = 15,
@@ -215,9 +221,9 @@ enum class AtomicOperation : std::uint32_t {
     compare_exchange, add_float, minimum_float, maximum_float,
 };
 
-/// Arguments and result of one image operation for all lanes. Coordinates by the dimension of the view: x, y, z in that order,
-/// the layer of an array behind them (rounded by the operation for samples, an integer for fetch, load, store and atomic).
-/// Cubes: a direction for sample and gather; for fetch, load and store x, y and the face (plus 6 * layer).
+/// Arguments and result of one image operation for all lanes. Coordinates by the dimension of the view: x, y, z in that
+/// order, the layer of an array behind them (rounded by the operation for samples, an integer for fetch, load, store
+/// and atomic). Cubes: a direction for sample and gather; for fetch, load and store x, y and the face (plus 6 * layer).
 struct ImageArguments {
     alignas(64) std::uint32_t coordinates[4][max_lanes];  ///< Bits of float or int.
     alignas(64) float lod[max_lanes];
@@ -227,7 +233,8 @@ struct ImageArguments {
     alignas(64) std::int32_t offset[3][max_lanes];
     alignas(64) std::int32_t sample[max_lanes];
     alignas(64) float min_lod[max_lanes];
-    alignas(64) std::uint32_t texel[4][max_lanes];        ///< store: bits of float or integer channels. atomic: [0] the value.
+    alignas(
+        64) std::uint32_t texel[4][max_lanes];  ///< store: bits of float or integer channels. atomic: [0] the value.
     alignas(64) std::uint32_t comparator[max_lanes];      ///< compare_exchange
     std::int32_t gather_offsets[4][2];
     AtomicOperation atomic;
@@ -257,9 +264,9 @@ struct TexelWords {
 
 }  // namespace nacre::cpu
 
-// Functions that compiled code calls. `flags` is an ImageOperation with ImageFlags. `live` has one bit for each lane; samples with
-// an implicit level of detail also read coordinates of the other lanes of each quad. `image` and `sampler` may be null: nothing
-// is bound; the result is zero.
+// Functions that compiled code calls. `flags` is an ImageOperation with ImageFlags. `live` has one bit for each lane;
+// samples with an implicit level of detail also read coordinates of the other lanes of each quad. `image` and `sampler`
+// may be null: nothing is bound; the result is zero.
 extern "C" {
 using NacreCpuImageFunction = void (*)(const nacre::cpu::ImageView* image, const nacre::cpu::SamplerState* sampler,
                                        nacre::cpu::ImageArguments* arguments, std::uint32_t flags, std::uint32_t live);

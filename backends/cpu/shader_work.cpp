@@ -37,7 +37,9 @@ class Shuffle {
     Shuffle(std::uint64_t total, std::uint32_t seed) : total_(total) {
         if (total >> 32) return;  // Backwards is order enough, and products stay in range.
         // Steps of about a golden part of the whole, which have no factor in common with it: neighbors come far apart.
-        step_ = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(static_cast<double>(total) * 0.6180339887) + seed) % total;
+        step_ =
+            std::max<std::uint64_t>(1, static_cast<std::uint64_t>(static_cast<double>(total) * 0.6180339887) + seed) %
+            total;
         while (std::gcd(step_, total) != 1) ++step_;
     }
     std::uint64_t operator()(std::uint64_t index) const {

@@ -17,8 +17,8 @@ namespace {
 
 using rhi::Format;
 
-// By a multiplication, which is off by one unit in the last place at most: so do Mesa's software drivers, and averages that lie in
-// the middle between two codes then fall to the same one.
+// By a multiplication, which is off by one unit in the last place at most: so do Mesa's software drivers, and averages
+// that lie in the middle between two codes then fall to the same one.
 const std::array<float, 256>& unorm_bytes() {
     static const std::array<float, 256> table = [] {
         std::array<float, 256> values{};

@@ -113,7 +113,8 @@ Expected<std::unique_ptr<rhi::BackendTexture>> CpuTexture::create(const std::sha
     texture->memory_bytes = bytes;
     if (checks) {
         const bool is_poisoned = (checks & (check_sanitize | check_hostile)) != 0;
-        texture->checked = std::make_unique<CheckedMemory>(fmt::format("texture '{}'", desc.name), data, bytes, !is_poisoned);
+        texture->checked =
+            std::make_unique<CheckedMemory>(fmt::format("texture '{}'", desc.name), data, bytes, !is_poisoned);
         if (is_poisoned) poison(data, bytes);
     }
     return texture;

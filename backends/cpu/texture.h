@@ -21,7 +21,8 @@ std::uint32_t stored_texel_bytes(rhi::Format format);
 class CpuTexture : public rhi::BackendTexture {
   public:
     static Expected<std::unique_ptr<rhi::BackendTexture>> create(const std::shared_ptr<HostMemory>& memory,
-                                                                 const rhi::TextureDesc& desc, std::uint32_t checks = 0);
+                                                                 const rhi::TextureDesc& desc,
+                                                                 std::uint32_t checks = 0);
 
     /// A part of the texture in the view's own format and dimension.
     [[nodiscard]] ImageView make_view(const rhi::ViewReference& reference) const;

@@ -48,22 +48,23 @@ Expected<std::unique_ptr<rhi::BackendBindGroup>> GlBindGroup::create(const Drive
         entry.view = binding.view;
         const bool sampled = rhi::is_sampled(binding.type);
         if (sampled && entry.texture && !entry.texture->can_view(binding.view))
-            return fail(ErrorCode::unsupported, "create bind group",
-                        fmt::format("'{}', binding {}, texture '{}'", name, binding.binding, entry.texture->desc.name),
-                        "this OpenGL ES has no texture views: only all layers, in the texture's own dimension and format, "
-                        "can be sampled",
-                        "Bind the whole texture and choose the layer in the shader.");
+            return fail(
+                ErrorCode::unsupported, "create bind group",
+                fmt::format("'{}', binding {}, texture '{}'", name, binding.binding, entry.texture->desc.name),
+                "this OpenGL ES has no texture views: only all layers, in the texture's own dimension and format, "
+                "can be sampled",
+                "Bind the whole texture and choose the layer in the shader.");
         // Parameters of the texture itself stand in for views there, so only one range of mips can be seen at a time.
         if (sampled && entry.texture && !entry.texture->can_show_ranges())
             for (const Entry& other : group->entries)
                 if (&other != &entry && other.texture == entry.texture &&
                     (other.view.base_mip != entry.view.base_mip || other.view.mip_count != entry.view.mip_count))
-                    return fail(ErrorCode::unsupported, "create bind group",
-                                fmt::format("'{}', binding {}, texture '{}'", name, binding.binding,
-                                            entry.texture->desc.name),
-                                "this OpenGL ES has no texture views: two different ranges of mips of one texture cannot be "
-                                "sampled at the same time",
-                                "Bind one range, and choose the mip in the shader.");
+                    return fail(
+                        ErrorCode::unsupported, "create bind group",
+                        fmt::format("'{}', binding {}, texture '{}'", name, binding.binding, entry.texture->desc.name),
+                        "this OpenGL ES has no texture views: two different ranges of mips of one texture cannot be "
+                        "sampled at the same time",
+                        "Bind one range, and choose the mip in the shader.");
     }
     return group;
 }

@@ -68,7 +68,8 @@ GlBuffer::~GlBuffer() {
         driver_->reserved_bytes -= memory_bytes;
         --driver_->allocations;
     }
-    if (name) driver_->worker->post([driver = driver_.get(), deleted = name] { driver->gl.DeleteBuffers(1, &deleted); });
+    if (name)
+        driver_->worker->post([driver = driver_.get(), deleted = name] { driver->gl.DeleteBuffers(1, &deleted); });
 }
 
 void GlBuffer::flush() {

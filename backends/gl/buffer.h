@@ -4,8 +4,8 @@
 #include "backends/gl/driver.h"
 
 /// @file
-/// Buffers. Upload and readback buffers are mapped for their whole life where the driver can (GL_ARB_buffer_storage); where
-/// not, the host sees a copy that `flush` and `invalidate` bring up to date.
+/// Buffers. Upload and readback buffers are mapped for their whole life where the driver can (GL_ARB_buffer_storage);
+/// where not, the host sees a copy that `flush` and `invalidate` bring up to date.
 
 namespace nacre::gl {
 
@@ -14,7 +14,8 @@ class GlBuffer : public rhi::BackendBuffer {
     explicit GlBuffer(DriverPointer driver) : driver_(std::move(driver)) {}
     ~GlBuffer() override;
 
-    static Expected<std::unique_ptr<rhi::BackendBuffer>> create(const DriverPointer& driver, const rhi::BufferDesc& desc);
+    static Expected<std::unique_ptr<rhi::BackendBuffer>> create(const DriverPointer& driver,
+                                                                const rhi::BufferDesc& desc);
 
     /// The host has written (upload) or is about to read (readback).
     void flush();

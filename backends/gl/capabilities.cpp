@@ -44,7 +44,8 @@ std::uint32_t samples(std::uint32_t most) { return most >= 4 ? 4 : 1; }
 rhi::Capabilities find_capabilities(const Functions& gl, const Traits& traits) {
     const Query query(gl);
     rhi::Capabilities result;
-    result.max_uniform_buffers = {query.number(GL_MAX_VERTEX_UNIFORM_BLOCKS), query.number(GL_MAX_FRAGMENT_UNIFORM_BLOCKS),
+    result.max_uniform_buffers = {query.number(GL_MAX_VERTEX_UNIFORM_BLOCKS),
+                                  query.number(GL_MAX_FRAGMENT_UNIFORM_BLOCKS),
                                   query.number(GL_MAX_COMPUTE_UNIFORM_BLOCKS)};
     result.max_storage_buffers = {query.number(GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS),
                                   query.number(GL_MAX_FRAGMENT_SHADER_STORAGE_BLOCKS),
@@ -92,7 +93,8 @@ rhi::Capabilities find_capabilities(const Functions& gl, const Traits& traits) {
     result.max_texture_cube = query.number(GL_MAX_CUBE_MAP_TEXTURE_SIZE);
     result.max_texture_layers = query.number(GL_MAX_ARRAY_TEXTURE_LAYERS);
     // Framebuffers are looked up by at most 8 targets.
-    result.max_color_targets = std::min({query.number(GL_MAX_DRAW_BUFFERS), query.number(GL_MAX_COLOR_ATTACHMENTS), 8u});
+    result.max_color_targets =
+        std::min({query.number(GL_MAX_DRAW_BUFFERS), query.number(GL_MAX_COLOR_ATTACHMENTS), 8u});
     result.max_dual_source_targets = traits.dual_source ? query.number(GL_MAX_DUAL_SOURCE_DRAW_BUFFERS) : 0;
     result.max_samples =
         samples(std::min(query.number(GL_MAX_COLOR_TEXTURE_SAMPLES), query.number(GL_MAX_DEPTH_TEXTURE_SAMPLES)));

@@ -62,7 +62,8 @@ struct BarrierPayload {
 
 void append_barrier(FlatPlan& plan, GLbitfield bits) {
     if (bits == 0) return;
-    const CommandHeader header{static_cast<CommandType>(barrier_command), 0, sizeof(CommandHeader) + sizeof(BarrierPayload)};
+    const CommandHeader header{static_cast<CommandType>(barrier_command), 0,
+                               sizeof(CommandHeader) + sizeof(BarrierPayload)};
     append(plan, &header, sizeof header);
     const BarrierPayload payload{bits, 0};
     append(plan, &payload, sizeof payload);
@@ -143,8 +144,9 @@ void Executor::execute(const CommandHeader& header, const std::byte* payload, co
         case CommandType::begin_render_pass: {
             const auto& command = as.operator()<rhi::BeginRenderPassCommand>();
             if (driver_.debug_names && driver_.traits.debug_output)
-                gl_.PushDebugGroup(GL_DEBUG_SOURCE_APPLICATION, 0, -1,
-                                   plan.strings[command.name].empty() ? "render pass" : plan.strings[command.name].c_str());
+                gl_.PushDebugGroup(
+                    GL_DEBUG_SOURCE_APPLICATION, 0, -1,
+                    plan.strings[command.name].empty() ? "render pass" : plan.strings[command.name].c_str());
             begin_render_pass(command);
             break;
         }
@@ -153,7 +155,8 @@ void Executor::execute(const CommandHeader& header, const std::byte* payload, co
             if (driver_.debug_names && driver_.traits.debug_output) gl_.PopDebugGroup();
             break;
         case CommandType::set_graphics_pipeline:
-            pipeline_ = static_cast<GlGraphicsPipeline*>(as.operator()<rhi::SetGraphicsPipelineCommand>().pipeline.object);
+            pipeline_ =
+                static_cast<GlGraphicsPipeline*>(as.operator()<rhi::SetGraphicsPipelineCommand>().pipeline.object);
             break;
         case CommandType::set_compute_pipeline:
             compute_pipeline_ =
@@ -161,7 +164,8 @@ void Executor::execute(const CommandHeader& header, const std::byte* payload, co
             break;
         case CommandType::set_bind_group: {
             const auto& command = as.operator()<rhi::SetBindGroupCommand>();
-            if (command.index < groups_.size()) groups_[command.index] = static_cast<GlBindGroup*>(command.group.object);
+            if (command.index < groups_.size())
+                groups_[command.index] = static_cast<GlBindGroup*>(command.group.object);
             groups_changed_ = true;
             break;
         }

@@ -13,8 +13,8 @@
 #include "backends/gl/transfer.h"
 
 /// @file
-/// Commands: a submission is copied into a flat list on the caller's thread (streams belong to the caller), with the memory
-/// barriers in their places, and is executed on the worker thread.
+/// Commands: a submission is copied into a flat list on the caller's thread (streams belong to the caller), with the
+/// memory barriers in their places, and is executed on the worker thread.
 
 namespace nacre::gl {
 

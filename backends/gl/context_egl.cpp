@@ -144,8 +144,8 @@ Expected<std::unique_ptr<Context>> make_egl_context(const ContextDesc& desc) {
     const Expected<Egl>& shared = shared_egl();
     if (!shared) return std::unexpected(shared.error());
     const Egl& egl = *shared;
-    // EGL's own state is per process: two threads that initialize one display at once are safe by the specification, but
-    // Mesa 22 reads its device list without a lock while doing so.
+    // EGL's own state is per process: two threads that initialize one display at once are safe by the specification,
+    // but Mesa 22 reads its device list without a lock while doing so.
     static std::mutex mutex;
     const std::scoped_lock lock(mutex);
     Expected<std::unique_ptr<Context>> made =

@@ -9,9 +9,10 @@
 namespace nacre::gl {
 namespace {
 
-void APIENTRY receive_message(GLenum source, GLenum type, GLuint id, GLenum severity, GLsizei length, const GLchar* text,
-                              const void* user) {
-    // Performance hints and our own group markers are no mistakes; nor are a compiler's notes on a shader that it takes.
+void APIENTRY receive_message(GLenum source, GLenum type, GLuint id, GLenum severity, GLsizei length,
+                              const GLchar* text, const void* user) {
+    // Performance hints and our own group markers are no mistakes; nor are a compiler's notes on a shader that it
+    // takes.
     if (type != GL_DEBUG_TYPE_ERROR && type != GL_DEBUG_TYPE_UNDEFINED_BEHAVIOR && type != GL_DEBUG_TYPE_PORTABILITY &&
         type != GL_DEBUG_TYPE_DEPRECATED_BEHAVIOR)
         return;
@@ -19,7 +20,8 @@ void APIENTRY receive_message(GLenum source, GLenum type, GLuint id, GLenum seve
     const auto& driver = *static_cast<const Driver*>(user);
     const bool is_error = type == GL_DEBUG_TYPE_ERROR || type == GL_DEBUG_TYPE_UNDEFINED_BEHAVIOR;
     driver.warn(is_error ? rhi::MessageSeverity::error : rhi::MessageSeverity::warning,
-                fmt::format("GL-{:04x}-{}", source, id), std::string(text, length < 0 ? 0 : static_cast<std::size_t>(length)));
+                fmt::format("GL-{:04x}-{}", source, id),
+                std::string(text, length < 0 ? 0 : static_cast<std::size_t>(length)));
 }
 
 void enable_debug_output(Driver& driver) {

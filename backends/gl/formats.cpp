@@ -224,7 +224,9 @@ GlVertexFormat vertex_format(Format format) {
     switch (facts.block_bytes / facts.channels) {
         case 1: result.type = is_signed ? GL_BYTE : GL_UNSIGNED_BYTE; break;
         case 2:
-            result.type = facts.kind == rhi::FormatKind::floating ? GL_HALF_FLOAT : is_signed ? GL_SHORT : GL_UNSIGNED_SHORT;
+            result.type = facts.kind == rhi::FormatKind::floating ? GL_HALF_FLOAT
+                          : is_signed                             ? GL_SHORT
+                                                                  : GL_UNSIGNED_SHORT;
             break;
         default:
             result.type = facts.kind == rhi::FormatKind::floating ? GL_FLOAT : is_signed ? GL_INT : GL_UNSIGNED_INT;

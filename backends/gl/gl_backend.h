@@ -13,8 +13,9 @@
 ///     backends.push_back(gl::make_es_backend());
 ///     rhi::Instance instance(std::move(backends));
 ///
-/// Every device has a thread of its own that its context is bound to; all calls go there, so any thread may call. Shaders are
-/// translated from SPIR-V with SPIRV-Cross when a pipeline is made, and kept with the driver's binary in the disk cache.
+/// Every device has a thread of its own that its context is bound to; all calls go there, so any thread may call.
+/// Shaders are translated from SPIR-V with SPIRV-Cross when a pipeline is made, and kept with the driver's binary in
+/// the disk cache.
 
 namespace nacre::gl {
 

@@ -101,7 +101,8 @@ void GlGraphicsPipeline::apply(Driver& driver, std::uint32_t stencil_reference) 
     const Traits& traits = driver.traits;
     set(gl, GL_CULL_FACE, desc.cull != rhi::CullMode::none);
     if (desc.cull != rhi::CullMode::none) gl.CullFace(desc.cull == rhi::CullMode::front ? GL_FRONT : GL_BACK);
-    // The same window coordinates, but OpenGL measures the area with y upwards: its counter-clockwise is Vulkan's clockwise.
+    // The same window coordinates, but OpenGL measures the area with y upwards: its counter-clockwise is Vulkan's
+    // clockwise.
     gl.FrontFace(desc.front_face == rhi::FrontFace::counter_clockwise ? GL_CW : GL_CCW);
     if (traits.polygon_mode) gl.PolygonMode(GL_FRONT_AND_BACK, desc.fill == rhi::FillMode::line ? GL_LINE : GL_FILL);
 

@@ -45,8 +45,8 @@ class Program {
     DriverPointer driver;
 };
 
-/// Translates, compiles and links, or takes the result from `cache`. An entry that the driver refuses (damaged, of another
-/// driver) is made anew. Errors: unsupported, shader_compile with the driver's log.
+/// Translates, compiles and links, or takes the result from `cache`. An entry that the driver refuses (damaged, of
+/// another driver) is made anew. Errors: unsupported, shader_compile with the driver's log.
 Expected<std::unique_ptr<Program>> make_program(const DriverPointer& driver, const DiskCache& cache,
                                                 std::span<rhi::BackendShader* const> stages,
                                                 std::span<const rhi::SpecializationConstant> specialization,

@@ -4,10 +4,10 @@
 #include "backends/gl/buffer.h"
 
 /// @file
-/// `flat` values come from the first vertex of a triangle in Vulkan and from the last one in OpenGL ES, which has no switch
-/// for it. Triangles of pipelines that read flat values are drawn with their corners turned by one place: the same
-/// triangle, the same winding, the other last vertex. A compute shader writes the indices; indirect draws, whose counts
-/// the host does not know, keep OpenGL's rule.
+/// `flat` values come from the first vertex of a triangle in Vulkan and from the last one in OpenGL ES, which has no
+/// switch for it. Triangles of pipelines that read flat values are drawn with their corners turned by one place: the
+/// same triangle, the same winding, the other last vertex. A compute shader writes the indices; indirect draws, whose
+/// counts the host does not know, keep OpenGL's rule.
 
 namespace nacre::gl {
 

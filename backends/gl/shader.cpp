@@ -184,7 +184,8 @@ class Translator {
                                             range.sampler_set, range.sampler_binding),
                                 "Use one binding for each sampler.");
             }
-            range.first = slots_.texture(range.set, range.binding, range.sampler_set, range.sampler_binding, range.count);
+            range.first =
+                slots_.texture(range.set, range.binding, range.sampler_set, range.sampler_binding, range.count);
             const bool sampled = range.sampler_binding != TextureRange::no_sampler;
             spvc_compiler_set_name(
                 compiler_, pairs[i].combined_id,
@@ -217,8 +218,8 @@ class Translator {
         const bool uniform = kind == SlotRange::Kind::uniform_buffer;
         range.first = uniform ? slots_.uniform_buffer(range.set, range.binding, range.count)
                               : slots_.storage_buffer(range.set, range.binding, range.count);
-        // Blocks and variables are matched by name between stages; names of our own keep two stages' different blocks of
-        // one name apart.
+        // Blocks and variables are matched by name between stages; names of our own keep two stages' different blocks
+        // of one name apart.
         const std::string suffix = fmt::format("{}_{}_{}", letter_, range.set, range.binding);
         spvc_compiler_set_name(compiler_, resource.base_type_id, ("Block_" + suffix).c_str());
         spvc_compiler_set_name(compiler_, resource.id, ("buffer_" + suffix).c_str());

@@ -12,8 +12,8 @@
 #include "rhi/backend.h"
 
 /// @file
-/// SPIR-V to GLSL 4.50 or ESSL 3.10/3.20 with SPIRV-Cross. OpenGL has neither bind groups nor push constants nor separate
-/// samplers, so a translation comes with the tables that tell what to bind where.
+/// SPIR-V to GLSL 4.50 or ESSL 3.10/3.20 with SPIRV-Cross. OpenGL has neither bind groups nor push constants nor
+/// separate samplers, so a translation comes with the tables that tell what to bind where.
 
 namespace nacre::gl {
 

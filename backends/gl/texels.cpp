@@ -54,7 +54,8 @@ std::uint32_t shared_exponent(const std::array<float, 3>& color) {
 
 std::uint32_t unorm(float value, int bits) {
     const double scale = static_cast<double>((std::uint64_t{1} << bits) - 1);
-    return static_cast<std::uint32_t>(std::nearbyint(std::clamp<double>(std::isnan(value) ? 0.0 : value, 0.0, 1.0) * scale));
+    return static_cast<std::uint32_t>(
+        std::nearbyint(std::clamp<double>(std::isnan(value) ? 0.0 : value, 0.0, 1.0) * scale));
 }
 
 std::uint32_t snorm(float value, int bits) {
@@ -78,8 +79,9 @@ void pack_texel(Format format, const ShaderTexel& texel, std::byte* destination)
     for (std::size_t i = 0; i < 4; ++i) value[i] = std::bit_cast<float>(texel[i]);
     switch (format) {
         case Format::rgb10a2_unorm:
-            store(unorm(value[0], 10) | unorm(value[1], 10) << 10 | unorm(value[2], 10) << 20 | unorm(value[3], 2) << 30,
-                  4, destination);
+            store(
+                unorm(value[0], 10) | unorm(value[1], 10) << 10 | unorm(value[2], 10) << 20 | unorm(value[3], 2) << 30,
+                4, destination);
             return;
         case Format::rgb10a2_uint:
             store((texel[0] & 1023) | (texel[1] & 1023) << 10 | (texel[2] & 1023) << 20 | (texel[3] & 3) << 30, 4,

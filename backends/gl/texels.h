@@ -9,7 +9,8 @@
 #include "rhi/format.h"
 
 /// @file
-/// Texels put together on the host, for what an OpenGL ES without extensions cannot read or clear in a format's own layout.
+/// Texels put together on the host, for what an OpenGL ES without extensions cannot read or clear in a format's own
+/// layout.
 
 namespace nacre::gl {
 
@@ -17,7 +18,8 @@ namespace nacre::gl {
 using ShaderTexel = std::array<std::uint32_t, 4>;
 
 /// Writes `texel` in the memory layout of `format` (uncompressed, block_bytes of it; depth formats as in
-/// copies: d24 in the low bits). Exact for values that the format can hold; others are rounded to the nearest even and clamped.
+/// copies: d24 in the low bits). Exact for values that the format can hold; others are rounded to the nearest even and
+/// clamped.
 void pack_texel(rhi::Format format, const ShaderTexel& texel, std::byte* destination);
 
 /// The clear color as a shader would have written it.

@@ -74,11 +74,12 @@ Expected<std::unique_ptr<rhi::BackendTexture>> GlTexture::create(const DriverPoi
     });
     if (error == GL_OUT_OF_MEMORY) return out_of_memory(desc);
     if (error != GL_NO_ERROR)
-        return fail(ErrorCode::unsupported, "create texture", fmt::format("'{}'", desc.name),
-                    fmt::format("the driver refuses {}x{}x{} texels, {} layers, {} mips, {} samples of {} (error 0x{:04x})",
-                                desc.width, desc.height, desc.depth, desc.layers, desc.mips, desc.samples,
-                                rhi::info(desc.format).name, error),
-                    "Choose another format or size; see the device's capabilities.");
+        return fail(
+            ErrorCode::unsupported, "create texture", fmt::format("'{}'", desc.name),
+            fmt::format("the driver refuses {}x{}x{} texels, {} layers, {} mips, {} samples of {} (error 0x{:04x})",
+                        desc.width, desc.height, desc.depth, desc.layers, desc.mips, desc.samples,
+                        rhi::info(desc.format).name, error),
+            "Choose another format or size; see the device's capabilities.");
     texture->memory_bytes = texture_bytes(desc);
     driver->reserved_bytes += texture->memory_bytes;
     ++driver->allocations;

@@ -9,8 +9,8 @@
 
 /// @file
 /// Textures and their views. A view that is not the whole texture in its own dimension and format is a texture
-/// object of its own (glTextureView), made when first bound and kept with the texture. Without texture views (plain OpenGL
-/// ES 3.1) only a range of mips can be chosen, by parameters of the texture itself.
+/// object of its own (glTextureView), made when first bound and kept with the texture. Without texture views (plain
+/// OpenGL ES 3.1) only a range of mips can be chosen, by parameters of the texture itself.
 
 namespace nacre::gl {
 

@@ -8,8 +8,8 @@
 #include "backends/gl/quirks.h"
 
 /// @file
-/// What the context may use beyond the common ground of OpenGL 4.5 and OpenGL ES 3.1. Every decision between two ways of
-/// doing something in this backend is a member here, so that a restricted device takes the same paths as a weak one.
+/// What the context may use beyond the common ground of OpenGL 4.5 and OpenGL ES 3.1. Every decision between two ways
+/// of doing something in this backend is a member here, so that a restricted device takes the same paths as a weak one.
 
 namespace nacre::gl {
 

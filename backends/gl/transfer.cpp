@@ -76,7 +76,9 @@ void Transfer::upload(GlTexture& texture, const Box& box, const void* pixels, co
     const auto y = static_cast<GLint>(box.offset.y), width = static_cast<GLsizei>(box.extent.width);
     const auto height = static_cast<GLsizei>(box.extent.height), layer = static_cast<GLint>(box.layer);
     switch (texture.target) {
-        case GL_TEXTURE_1D: gl_.TexSubImage1D(texture.target, mip, x, width, format.external, format.type, pixels); break;
+        case GL_TEXTURE_1D:
+            gl_.TexSubImage1D(texture.target, mip, x, width, format.external, format.type, pixels);
+            break;
         case GL_TEXTURE_1D_ARRAY:
             gl_.TexSubImage2D(texture.target, mip, x, layer, width, 1, format.external, format.type, pixels);
             break;
@@ -130,7 +132,8 @@ void Transfer::upload_compressed(GlTexture& texture, const Box& box, std::uint64
         }
 }
 
-void Transfer::upload_depth_stencil(GlTexture& texture, const Box& box, const rhi::CopyBufferToTextureCommand& command) {
+void Transfer::upload_depth_stencil(GlTexture& texture, const Box& box,
+                                    const rhi::CopyBufferToTextureCommand& command) {
     const bool d24 = texture.desc.format == rhi::Format::d24_unorm_s8_uint;
     const std::size_t texel_bytes = d24 ? 4 : 8;
     const std::size_t width = box.extent.width, height = box.extent.height;

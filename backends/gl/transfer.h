@@ -9,10 +9,11 @@
 /// @file
 /// Copies, clears, resolves and mip generation. Worker thread only.
 ///
-/// Desktop OpenGL copies every format between buffers and textures in its own layout. OpenGL ES reads only a few layouts, so
-/// texels come back as integers or floats (drawn as such where the format cannot be attached to a framebuffer) and
-/// are put together on the host. Uploads of d24_unorm_s8_uint and d32_float_s8_uint keep the stencil on desktop and set it to 0
-/// in OpenGL ES, which cannot read it; depth of 24 bits, read there as a float, may be off by one step.
+/// Desktop OpenGL copies every format between buffers and textures in its own layout. OpenGL ES reads only a few
+/// layouts, so texels come back as integers or floats (drawn as such where the format cannot be attached to a
+/// framebuffer) and are put together on the host. Uploads of d24_unorm_s8_uint and d32_float_s8_uint keep the stencil
+/// on desktop and set it to 0 in OpenGL ES, which cannot read it; depth of 24 bits, read there as a float, may be off
+/// by one step.
 
 namespace nacre::gl {
 
@@ -48,8 +49,8 @@ class Transfer {
     void upload_compressed(GlTexture& texture, const Box& box, std::uint64_t pixels, const Pitch& pitch);
     void upload_depth_stencil(GlTexture& texture, const Box& box, const rhi::CopyBufferToTextureCommand& command);
     /// Reads on desktop into the bound pack buffer at `pixels`, or to memory.
-    void download(GlTexture& texture, const Box& box, void* pixels, std::uint64_t bytes, const Pitch& pitch, GLenum format,
-                  GLenum type);
+    void download(GlTexture& texture, const Box& box, void* pixels, std::uint64_t bytes, const Pitch& pitch,
+                  GLenum format, GLenum type);
     /// Reads on any OpenGL into tight rows on the host, in the format's own layout.
     std::vector<std::byte> read(GlTexture& texture, const Box& box);
     void read_slice(GlTexture& texture, const Box& box, std::uint32_t slice, std::byte* destination);

@@ -10,9 +10,9 @@
 #include "backends/gl/transfer.h"
 
 /// @file
-/// Reading texels in OpenGL ES. glReadPixels guarantees three layouts: 8-bit RGBA for normalized formats, RGBA of 32-bit
-/// integers for integer formats, and RGBA of floats for float formats that can be attached. What cannot be attached is
-/// drawn into a target of RGBA32UI, as the bits of the floats that a shader reads.
+/// Reading texels in OpenGL ES. glReadPixels guarantees three layouts: 8-bit RGBA for normalized formats, RGBA of
+/// 32-bit integers for integer formats, and RGBA of floats for float formats that can be attached. What cannot be
+/// attached is drawn into a target of RGBA32UI, as the bits of the floats that a shader reads.
 
 namespace nacre::gl {
 namespace {
@@ -76,7 +76,8 @@ GLuint Transfer::fetch_program(GLenum target) {
     const char* fetch = target == GL_TEXTURE_CUBE_MAP ? "textureLod(source, direction(place.xy), float(place.w))"
                         : target == GL_TEXTURE_2D     ? "texelFetch(source, place.xy, place.w)"
                                                       : "texelFetch(source, place.xyz, place.w)";
-    const std::string fragment = fmt::format(R"(#version 310 es
+    const std::string fragment =
+        fmt::format(R"(#version 310 es
 precision highp float;
 precision highp int;
 uniform highp {} source;
@@ -90,17 +91,17 @@ void main() {{
     ivec4 place = origin + ivec4(ivec2(gl_FragCoord.xy), 0, 0);
     bits = floatBitsToUint({});
 }})",
-                                             sampler,
-                                             target == GL_TEXTURE_CUBE_MAP
-                                                 ? R"(vec2 uv = (vec2(texel) + 0.5) / vec2(textureSize(source, origin.w)) * 2.0 - 1.0;
+                    sampler,
+                    target == GL_TEXTURE_CUBE_MAP
+                        ? R"(vec2 uv = (vec2(texel) + 0.5) / vec2(textureSize(source, origin.w)) * 2.0 - 1.0;
     if (face == 0) return vec3(1.0, -uv.y, -uv.x);
     if (face == 1) return vec3(-1.0, -uv.y, uv.x);
     if (face == 2) return vec3(uv.x, 1.0, uv.y);
     if (face == 3) return vec3(uv.x, -1.0, -uv.y);
     if (face == 4) return vec3(uv.x, -uv.y, 1.0);
     return vec3(-uv.x, -uv.y, -1.0);)"
-                                                 : "return vec3(texel, face);",
-                                             fetch);
+                        : "return vec3(texel, face);",
+                    fetch);
     static constexpr const char* vertex = R"(#version 310 es
 void main() {
     gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);

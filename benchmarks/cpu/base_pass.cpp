@@ -17,8 +17,8 @@
 
 /// @file
 /// Drawing: the base pass (three integer color targets and depth) over a landscape that covers the picture once, as
-/// 250,632 triangles of 8 pixels and as 2,450 large ones. Depth is tested and written in the same pass, or tested for equality
-/// after a prepass, as whole frames do.
+/// 250,632 triangles of 8 pixels and as 2,450 large ones. Depth is tested and written in the same pass, or tested for
+/// equality after a prepass, as whole frames do.
 
 namespace nacre::bench {
 namespace {
@@ -53,8 +53,8 @@ scene::Scene coarse_landscape() {
             const float x = 40.0f * static_cast<float>(column) / squares - 20.0f;
             const float z = 40.0f * static_cast<float>(row) / squares - 20.0f;
             primitive.positions.emplace_back(x, height(x, z), z);
-            primitive.normals.push_back(glm::normalize(
-                glm::vec3(height(x - 0.01f, z) - height(x + 0.01f, z), 0.02f, height(x, z - 0.01f) - height(x, z + 0.01f))));
+            primitive.normals.push_back(glm::normalize(glm::vec3(height(x - 0.01f, z) - height(x + 0.01f, z), 0.02f,
+                                                                 height(x, z - 0.01f) - height(x, z + 0.01f))));
             primitive.bounds.add(primitive.positions.back());
         }
     }
@@ -90,11 +90,12 @@ class Landscape {
                 depth_draws_.record(list, group_, visible_);
                 list.end_render_pass();
             }
-            rhi::RenderPassDesc pass{.depth_stencil = {.view = depth_,
-                                                       .depth_load = prepass_ ? LoadOperation::load : LoadOperation::clear,
-                                                       .clear_depth = 0.0f,
-                                                       .read_only = prepass_},
-                                     .name = "base pass"};
+            rhi::RenderPassDesc pass{
+                .depth_stencil = {.view = depth_,
+                                  .depth_load = prepass_ ? LoadOperation::load : LoadOperation::clear,
+                                  .clear_depth = 0.0f,
+                                  .read_only = prepass_},
+                .name = "base pass"};
             for (const rhi::Texture word : words_) {
                 rhi::ColorAttachment attachment{.view = word, .load = LoadOperation::clear};
                 attachment.clear.uint = {0, 0, 0, 0};

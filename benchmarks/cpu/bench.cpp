@@ -152,9 +152,9 @@ std::string Bench::table() const {
     std::string text = fmt::format("\n{:<38} {:>5} {:>10} {:<10} {:>10} {:>7} {:>8} {:>11} {:>7}\n", "case", "lanes",
                                    "cpu ms", "reference", "ms", "ratio", "(median)", "(processor)", "target");
     for (const Result& result : results_) {
-        text += fmt::format("{:<38} {:>5} {:>10.2f} {:<10} {:>10.2f} {:>7.2f} {:>8.2f} {:>11.2f} {:>7}{}\n", result.name,
-                            result.lanes, result.cpu_ms, result.reference, result.reference_ms, result.ratio(),
-                            result.ratio_of_medians(), result.ratio_of_processor_time(),
+        text += fmt::format("{:<38} {:>5} {:>10.2f} {:<10} {:>10.2f} {:>7.2f} {:>8.2f} {:>11.2f} {:>7}{}\n",
+                            result.name, result.lanes, result.cpu_ms, result.reference, result.reference_ms,
+                            result.ratio(), result.ratio_of_medians(), result.ratio_of_processor_time(),
                             result.target > 0 ? fmt::format("{:.2f}", result.target) : "",
                             result.target > result.ratio() ? "  missed" : "");
     }
@@ -232,7 +232,8 @@ Expected<void> Bench::write_report(const std::string& folder) const {
     std::error_code problem;
     std::filesystem::create_directories(folder, problem);
     NACRE_CHECK(write_file_atomically(folder + "/table.md", markdown()));
-    return write_file_atomically(folder + "/report.json", report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+    return write_file_atomically(folder + "/report.json",
+                                 report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 Expected<double> time_ms(const std::function<Expected<void>()>& work) {

@@ -13,9 +13,9 @@
 #include "scene/load.h"
 
 /// @file
-/// Compiling: every shader of a frame of builtin:spheres, from the creation of its pipeline to the end of the first work that
-/// uses it, less the same work once more. (Drivers put off part of the work to the first use.) No caches; each round has a
-/// new device. Resources are small and hold zeros, so that the work itself is next to nothing.
+/// Compiling: every shader of a frame of builtin:spheres, from the creation of its pipeline to the end of the first
+/// work that uses it, less the same work once more. (Drivers put off part of the work to the first use.) No caches;
+/// each round has a new device. Resources are small and hold zeros, so that the work itself is next to nothing.
 
 namespace nacre::bench {
 namespace {
@@ -45,7 +45,8 @@ Expected<std::vector<Program>> programs_of(rhi::Device& device, const std::strin
         };
         for (const passes::PlannedShader& shader : pass.shaders) {
             if (!shader.path.ends_with(".frag")) finish();
-            NACRE_TRY(rhi::ShaderDesc desc, library.compile(pass.name, {.path = shader.path, .defines = shader.defines}));
+            NACRE_TRY(rhi::ShaderDesc desc,
+                      library.compile(pass.name, {.path = shader.path, .defines = shader.defines}));
             NACRE_TRY(rhi::ShaderReflection reflection, rhi::reflect(desc.spirv, desc.stage));
             program.name += (program.name.empty() ? "" : " + ") + shader.path.substr(shader.path.rfind('/') + 1);
             key += fmt::format("{} {:x};", shader.path, shader.spirv_hash);

@@ -66,7 +66,8 @@ Expected<void> run_copy(Bench& bench) {
                                        scheduler->run(parts, [&](std::uint32_t index, std::uint32_t) {
                                            const std::uint64_t begin = copied_bytes * index / parts;
                                            const std::uint64_t end = copied_bytes * (index + 1) / parts;
-                                           std::memcpy(destination->data() + begin, source->data() + begin, end - begin);
+                                           std::memcpy(destination->data() + begin, source->data() + begin,
+                                                       end - begin);
                                        });
                                        return {};
                                    });

@@ -23,8 +23,8 @@ struct LightingBlock {
 /// Whether this processor runs `light_rows_by_hand`.
 bool can_light_by_hand();
 
-/// Lights rows [first_row, last_row) of a picture whose width is a multiple of 16, with AVX-512 instructions. `words` and
-/// `lit` as in the shader, aligned to 64 bytes.
+/// Lights rows [first_row, last_row) of a picture whose width is a multiple of 16, with AVX-512 instructions. `words`
+/// and `lit` as in the shader, aligned to 64 bytes.
 void light_rows_by_hand(const LightingBlock& block, const glm::uvec4* words, glm::vec4* lit, std::uint32_t first_row,
                         std::uint32_t last_row);
 

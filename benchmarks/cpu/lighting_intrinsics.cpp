@@ -2,9 +2,9 @@
 #include "benchmarks/cpu/lighting.h"
 
 /// @file
-/// benchmarks/cpu/lighting.comp written by hand with AVX-512 instructions, 16 pixels at once: what a compiler of shaders is
-/// measured by. Lights are broadcast, pow(x, 5) is three multiplications, a light that none of the 16 pixels faces is left
-/// out, divisions and square roots are those of IEEE 754.
+/// benchmarks/cpu/lighting.comp written by hand with AVX-512 instructions, 16 pixels at once: what a compiler of
+/// shaders is measured by. Lights are broadcast, pow(x, 5) is three multiplications, a light that none of the 16 pixels
+/// faces is left out, divisions and square roots are those of IEEE 754.
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -72,7 +72,8 @@ __attribute__((target("avx512f,avx512dq,fma"))) void light_rows_by_hand(const Li
             __m512i word[4];
             for (int i = 0; i < 4; ++i) word[i] = _mm512_load_si512(words + index + 4 * i);
             transpose(word);
-            const Vector diffuse = scaled({byte_of(word[0], 0), byte_of(word[0], 8), byte_of(word[0], 16)}, all(1.0f / pi));
+            const Vector diffuse =
+                scaled({byte_of(word[0], 0), byte_of(word[0], 8), byte_of(word[0], 16)}, all(1.0f / pi));
             const Vector f0 = {byte_of(word[1], 0), byte_of(word[1], 8), byte_of(word[1], 16)};
             const __m512 roughness = _mm512_max_ps(byte_of(word[1], 24), all(0.2f));
 

@@ -22,9 +22,9 @@ struct StretchedLobe {
     glm::dvec3 view;
 };
 
-/// By the alphas of the slopes in the plane of view and normal and across it, and their correlation: slopes are spread as
-/// an ellipse, whose axes are turned into those of the lobe. One alpha can be up to sqrt(2): corners of the table lie
-/// beyond all lobes.
+/// By the alphas of the slopes in the plane of view and normal and across it, and their correlation: slopes are spread
+/// as an ellipse, whose axes are turned into those of the lobe. One alpha can be up to sqrt(2): corners of the table
+/// lie beyond all lobes.
 inline StretchedLobe stretched_lobe(double along, double across, double correlation, double cosine) {
     const double a = along * along, b = across * across, c = correlation * along * across;
     const double mean = 0.5 * (a + b), difference = std::hypot(0.5 * (a - b), c);
@@ -79,8 +79,8 @@ inline std::array<double, 2> anisotropy_table_sample(const AnisotropyIndex& inde
             0.8 * typical(albedo) / library.stretched_cosine(view, x, typical(exact))};
 }
 
-/// The entry of anisotropy_table(), two numbers in [0, 1], by samples of its neighborhood. Between two entries a line is
-/// off by an eighth of the second difference, to one side; half of that is taken from the entries.
+/// The entry of anisotropy_table(), two numbers in [0, 1], by samples of its neighborhood. Between two entries a line
+/// is off by an eighth of the second difference, to one side; half of that is taken from the entries.
 template <typename Sample>
 std::array<double, 2> anisotropy_table_entry(const AnisotropyIndex& index, Sample&& sample) {
     std::array<double, 2> entry = sample(index);

@@ -14,9 +14,9 @@
 /// 0    | share of what comes out at all that comes out of the far side
 /// 1    | 1 - the share that comes out over the albedo of a single scattering
 ///
-/// Both change slowly, and word 1 is 0 where nothing is absorbed: energy is kept whatever lies between the entries. Both
-/// are what is small where digits matter: what comes through a deep medium, and what a bright one absorbs.
-/// Read by materials/closures/medium.glsl. Written by materials/tables/write_tables.cpp.
+/// Both change slowly, and word 1 is 0 where nothing is absorbed: energy is kept whatever lies between the entries.
+/// Both are what is small where digits matter: what comes through a deep medium, and what a bright one absorbs. Read by
+/// materials/closures/medium.glsl. Written by materials/tables/write_tables.cpp.
 
 namespace nacre::materials {
 

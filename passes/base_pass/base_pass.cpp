@@ -5,8 +5,8 @@
 
 /// @file
 /// Base pass: evaluates the materials of what is seen and packs them into the three words of the G-buffer
-/// (passes/gbuffer_layout.h). Materials of several lobes may need more words, which go to slices of a storage image; all
-/// else is color targets. Tests for the depth of the prepasses.
+/// (passes/gbuffer_layout.h). Materials of several lobes may need more words, which go to slices of a storage image;
+/// all else is color targets. Tests for the depth of the prepasses.
 
 namespace nacre::passes {
 
@@ -56,7 +56,8 @@ class BasePass final : public GeometryPass {
                                                               resources.top_layer}](const PassContext& frame) {
                      rhi::RenderPassDesc targets{.depth_stencil = {.view = frame.texture(depth), .read_only = true}};
                      for (const TextureId word : words) {
-                         rhi::ColorAttachment attachment{.view = frame.texture(word), .load = rhi::LoadOperation::clear};
+                         rhi::ColorAttachment attachment{.view = frame.texture(word),
+                                                         .load = rhi::LoadOperation::clear};
                          attachment.clear.uint = {0, 0, 0, 0};
                          targets.color.push_back(attachment);
                      }

@@ -7,9 +7,9 @@
 
 /// @file
 /// Blend: surfaces of alpha mode BLEND, lit in their fragment shader and laid over the picture from far to near (by the
-/// middle of each placed primitive). Where a device cannot blend into float targets, surfaces are gathered into groups that
-/// follow each other in depth; each group is drawn into integer targets (its nearest surface wins) and a compute shader
-/// lays it over the picture. Left out where nothing blends.
+/// middle of each placed primitive). Where a device cannot blend into float targets, surfaces are gathered into groups
+/// that follow each other in depth; each group is drawn into integer targets (its nearest surface wins) and a compute
+/// shader lays it over the picture. Left out where nothing blends.
 
 namespace nacre::passes {
 
@@ -20,7 +20,10 @@ namespace {
 class Blend final : public RenderPass {
   public:
     explicit Blend(RenderContext& context)
-        : geometry_(context.geometry), visible_(context.visible), device_(context.device), packed_(context.decisions.packed_targets) {
+        : geometry_(context.geometry),
+          visible_(context.visible),
+          device_(context.device),
+          packed_(context.decisions.packed_targets) {
         name = "blend";
         sorted_ = select_draws(context.geometry, [](const Draw& draw) {
             return draw.alpha_mode == materials::AlphaMode::blend;

@@ -2,8 +2,9 @@
 #include "passes/geometry_pass.h"
 
 /// @file
-/// Depth prepass: the depth of everything opaque that is not alpha-tested, without a fragment shader. Base pass, emission
-/// and blending test against it, so that each pixel is shaded once. It clears depth (to 0, which is far) and stencil.
+/// Depth prepass: the depth of everything opaque that is not alpha-tested, without a fragment shader. Base pass,
+/// emission and blending test against it, so that each pixel is shaded once. It clears depth (to 0, which is far) and
+/// stencil.
 
 namespace nacre::passes {
 

@@ -2,9 +2,9 @@
 #include "passes/geometry_pass.h"
 
 /// @file
-/// Emission: draws what emits once more and adds its light to the lit color, where depth is equal and the stencil prepass
-/// has left its mark. Where a device cannot blend into float targets, it draws into an integer target before the
-/// lighting, which adds it. Left out where nothing emits.
+/// Emission: draws what emits once more and adds its light to the lit color, where depth is equal and the stencil
+/// prepass has left its mark. Where a device cannot blend into float targets, it draws into an integer target before
+/// the lighting, which adds it. Left out where nothing emits.
 
 namespace nacre::passes {
 

@@ -66,9 +66,10 @@ std::vector<std::uint64_t> half_floats(const std::vector<glm::vec4>& texels) {
     return halves;
 }
 
-/// The next mip by a 2 x 2 box. Made here and not by the device: one with the guarantees of OpenGL ES 3.1 only can neither draw
-/// into float textures, nor fill their mips, nor sample one mip of a texture while it writes another.
-std::vector<glm::vec4> halved(const std::vector<glm::vec4>& texels, const rhi::Extent3D& from, const rhi::Extent3D& to) {
+/// The next mip by a 2 x 2 box. Made here and not by the device: one with the guarantees of OpenGL ES 3.1 only can
+/// neither draw into float textures, nor fill their mips, nor sample one mip of a texture while it writes another.
+std::vector<glm::vec4> halved(const std::vector<glm::vec4>& texels, const rhi::Extent3D& from,
+                              const rhi::Extent3D& to) {
     std::vector<glm::vec4> result;
     result.reserve(std::size_t{to.width} * to.height);
     for (std::uint32_t y = 0; y < to.height; ++y) {
@@ -128,19 +129,21 @@ Expected<std::unique_ptr<PreparedEnvironment>> PreparedEnvironment::create(rhi::
     temporary.textures.push_back(picture);
     std::vector<glm::vec4> texels = present ? environment.texels : std::vector<glm::vec4>(1, glm::vec4(0.0f));
     for (std::uint32_t mip = 0; mip < picture_desc.mips; ++mip) {
-        if (mip > 0) texels = halved(texels, rhi::mip_extent(picture_desc, mip - 1), rhi::mip_extent(picture_desc, mip));
+        if (mip > 0)
+            texels = halved(texels, rhi::mip_extent(picture_desc, mip - 1), rhi::mip_extent(picture_desc, mip));
         const std::vector<std::uint64_t> halves = half_floats(texels);
         NACRE_CHECK(device.write_texture(picture, std::as_bytes(std::span(halves)), mip));
     }
 
-    rhi::TextureDesc source_desc{.dimension = rhi::TextureDimension::cube,
-                                 .format = rhi::Format::rgba16_float,
-                                 .width = size,
-                                 .height = size,
-                                 .layers = 6,
-                                 .mips = rhi::full_mip_count(size, size),
-                                 .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::storage | rhi::TextureUsage::copy_source,
-                                 .name = "environment cube"};
+    rhi::TextureDesc source_desc{
+        .dimension = rhi::TextureDimension::cube,
+        .format = rhi::Format::rgba16_float,
+        .width = size,
+        .height = size,
+        .layers = 6,
+        .mips = rhi::full_mip_count(size, size),
+        .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::storage | rhi::TextureUsage::copy_source,
+        .name = "environment cube"};
     NACRE_TRY(const rhi::Texture source, device.create_texture(source_desc));
     temporary.textures.push_back(source);
     result->cube_desc_ = source_desc;
@@ -173,16 +176,21 @@ Expected<std::unique_ptr<PreparedEnvironment>> PreparedEnvironment::create(rhi::
     NACRE_TRY(const rhi::Sampler cube_sampler, device.create_sampler(around));
     temporary.samplers.push_back(cube_sampler);
 
-    // The functions below refer to what lives in this function only: the graph is recorded here once, then only looked at.
+    // The functions below refer to what lives in this function only: the graph is recorded here once, then only looked
+    // at.
     FrameGraph& graph = result->graph_;
     const TextureId picture_id = graph.import_texture(picture, picture_desc);
     const TextureId source_id = graph.import_texture(source, source_desc);
     const TextureId cube_id = graph.import_texture(result->cube_, result->cube_desc_);
     const BufferId irradiance_id = graph.import_buffer(result->irradiance_, result->irradiance_desc_);
-    const BufferId parameters_id = graph.import_buffer(temporary.parameters, {.size = blocks.size(), .name = "environment parameters"});
-    const auto groups_for = [](std::uint32_t side) { return rhi::DispatchArguments{(side + 7) / 8, (side + 7) / 8, 6}; };
+    const BufferId parameters_id =
+        graph.import_buffer(temporary.parameters, {.size = blocks.size(), .name = "environment parameters"});
+    const auto groups_for = [](std::uint32_t side) {
+        return rhi::DispatchArguments{(side + 7) / 8, (side + 7) / 8, 6};
+    };
 
-    // Every mip of the source comes from the mip of the picture whose texels are as large; roughness 0 mirrors the first.
+    // Every mip of the source comes from the mip of the picture whose texels are as large; roughness 0 mirrors the
+    // first.
     const std::string to_cube = "environment to cube";
     std::vector<Step> conversions;
     for (std::uint32_t mip = 0; mip <= source_desc.mips; ++mip) {

@@ -19,7 +19,8 @@ namespace nacre::passes {
 
 class PreparedEnvironment {
   public:
-    /// `largest_size`: of a cube face; the picture's own resolution where that is smaller. A missing environment is black.
+    /// `largest_size`: of a cube face; the picture's own resolution where that is smaller. A missing environment is
+    /// black.
     static Expected<std::unique_ptr<PreparedEnvironment>> create(rhi::Device& device, ShaderLibrary& shaders,
                                                                  const scene::Environment& environment,
                                                                  std::uint32_t largest_size, std::uint32_t samples);

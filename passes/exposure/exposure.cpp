@@ -2,7 +2,8 @@
 #include "passes/render_pass.h"
 
 /// @file
-/// Automatic exposure: the median luminance of the lit picture becomes middle gray. Left out where the exposure is given.
+/// Automatic exposure: the median luminance of the lit picture becomes middle gray. Left out where the exposure is
+/// given.
 
 namespace nacre::passes {
 

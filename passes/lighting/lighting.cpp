@@ -4,8 +4,8 @@
 #include <array>
 
 /// @file
-/// Lighting: for each list of tiles one indirect dispatch with the shader of that list, which reads the G-buffer and writes
-/// the lit color. Lists that the scene cannot fill (unlit, mixed) have no shader and no dispatch.
+/// Lighting: for each list of tiles one indirect dispatch with the shader of that list, which reads the G-buffer and
+/// writes the lit color. Lists that the scene cannot fill (unlit, mixed) have no shader and no dispatch.
 
 namespace nacre::passes {
 
@@ -20,7 +20,8 @@ struct TileList {
     bool slab, unlit;
     bool closures = false;
 };
-constexpr std::array<TileList, 4> lists = {{{0, true, false}, {1, false, true}, {2, true, true}, {4, true, true, true}}};
+constexpr std::array<TileList, 4> lists = {
+    {{0, true, false}, {1, false, true}, {2, true, true}, {4, true, true, true}}};
 
 class Lighting final : public RenderPass {
   public:
@@ -79,22 +80,26 @@ class Lighting final : public RenderPass {
                 {.binding = 0, .type = rhi::BindingType::combined_texture_sampler}};
             if (step.list.slab) {
                 source.defines.push_back({"SLAB"});
-                for (const rhi::ShaderDefine& define : lighting_defines(context.decisions)) source.defines.push_back(define);
+                for (const rhi::ShaderDefine& define : lighting_defines(context.decisions))
+                    source.defines.push_back(define);
                 const TextureId textures[] = {resources_.material_1, resources_.top_layer, resources_.depth};
                 for (std::uint32_t i = 0; i < 3; ++i) {
-                    entries.push_back({.binding = i + 1, .texture = graph.texture(textures[i]), .sampler = context.nearest});
+                    entries.push_back(
+                        {.binding = i + 1, .texture = graph.texture(textures[i]), .sampler = context.nearest});
                     bindings.push_back({.binding = i + 1, .type = rhi::BindingType::combined_texture_sampler});
                 }
             }
             if (step.list.unlit) source.defines.push_back({"UNLIT"});
             if (step.list.closures) {
-                for (const rhi::ShaderDefine& define : context.closures.lighting_defines()) source.defines.push_back(define);
+                for (const rhi::ShaderDefine& define : context.closures.lighting_defines())
+                    source.defines.push_back(define);
                 const auto add = [&](std::uint32_t binding, rhi::Texture texture) {
                     entries.push_back({.binding = binding, .texture = texture, .sampler = context.nearest});
                     bindings.push_back({.binding = binding, .type = rhi::BindingType::combined_texture_sampler});
                 };
                 for (std::uint32_t table = 1; table < closure_table_count; ++table) {
-                    if (reads_table(context.closures.lighting().features, table)) add(8 + table, context.materials.table(table));
+                    if (reads_table(context.closures.lighting().features, table))
+                        add(8 + table, context.materials.table(table));
                 }
                 if (resources_.material_slices) add(8 + closure_table_count, graph.texture(resources_.material_slices));
             }
@@ -106,7 +111,8 @@ class Lighting final : public RenderPass {
             bindings.push_back({.binding = 6, .type = rhi::BindingType::writeonly_storage_image});
             if (resources_.emission) {
                 source.defines.push_back({"EMISSION_TARGET"});
-                entries.push_back({.binding = 7, .texture = graph.texture(resources_.emission), .sampler = context.nearest});
+                entries.push_back(
+                    {.binding = 7, .texture = graph.texture(resources_.emission), .sampler = context.nearest});
                 bindings.push_back({.binding = 7, .type = rhi::BindingType::combined_texture_sampler});
             }
             for (rhi::BindingLayout& binding : bindings) binding.stages = rhi::ShaderStage::compute;

@@ -5,8 +5,8 @@
 
 /// @file
 /// Shadow maps: one depth texture with a layer for each view (one for directional and spot lights, six around a point
-/// light), reversed depth. Alpha-tested surfaces let light through where they are not; blended ones cast no shadow. Left
-/// out where no light casts shadows.
+/// light), reversed depth. Alpha-tested surfaces let light through where they are not; blended ones cast no shadow.
+/// Left out where no light casts shadows.
 
 namespace nacre::passes {
 

@@ -2,9 +2,9 @@
 #include "passes/render_pass.h"
 
 /// @file
-/// Tile classification: sorts tiles of 8x8 pixels into lists by what their pixels hold, so that lighting and sky run only
-/// where they are needed, each list with a shader that knows no other case. The lists' lengths are arguments of indirect
-/// dispatches; the host never sees them.
+/// Tile classification: sorts tiles of 8x8 pixels into lists by what their pixels hold, so that lighting and sky run
+/// only where they are needed, each list with a shader that knows no other case. The lists' lengths are arguments of
+/// indirect dispatches; the host never sees them.
 
 namespace nacre::passes {
 
@@ -22,7 +22,8 @@ class TileClassification final : public RenderPass {
         PassDeclaration pass = context.graph.add_pass(name);
         pass.uses(resources_.material_0, ResourceUse::sampled)
             .uses(resources_.tile_lists_start, ResourceUse::copy_source)
-            .uses(resources_.tile_lists, ResourceUse::copy_destination | ResourceUse::storage_read | ResourceUse::storage_write)
+            .uses(resources_.tile_lists,
+                  ResourceUse::copy_destination | ResourceUse::storage_read | ResourceUse::storage_write)
             .uses(resources_.tiles, ResourceUse::storage_read | ResourceUse::storage_write);
         if (write_classes_) pass.uses(resources_.tile_classes, ResourceUse::storage_write);
         pass.records([this](PassContext& frame) {

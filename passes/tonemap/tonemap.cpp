@@ -2,7 +2,8 @@
 #include "passes/render_pass.h"
 
 /// @file
-/// Tone mapping: exposure, tone curve (passes/tonemap/filmic.glsl or none) and sRGB encoding into the final 8-bit picture.
+/// Tone mapping: exposure, tone curve (passes/tonemap/filmic.glsl or none) and sRGB encoding into the final 8-bit
+/// picture.
 
 namespace nacre::passes {
 

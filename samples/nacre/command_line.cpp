@@ -225,9 +225,10 @@ void add_scene(CLI::App& app, SceneArguments& arguments, bool is_required = true
 void add_backend(CLI::App& app, SceneArguments& arguments) {
     app.add_option_function<std::string>(
            "-b,--backend", [&](const std::string& text) { arguments.backends = {text}; },
-           fmt::format("Where to render: NAME[:MODE][:CHECK][:lanes=N][:threads=N], NAME being auto (the first that works: "
-                       "cpu) or one of {}; checks of cpu are traps, sanitize and hostile[=N]",
-                       join(backend_names())))
+           fmt::format(
+               "Where to render: NAME[:MODE][:CHECK][:lanes=N][:threads=N], NAME being auto (the first that works: "
+               "cpu) or one of {}; checks of cpu are traps, sanitize and hostile[=N]",
+               join(backend_names())))
         ->type_name("BACKEND")
         ->group("Device");
 }
@@ -242,10 +243,11 @@ void add_device(CLI::App& app, SceneArguments& arguments) {
         ->type_name("PROFILE")
         ->check(one_of(profile_names()))
         ->group("Device");
-    app.add_option("--restrict", arguments.restriction,
-                   fmt::format("Hold the device to smaller capabilities: {}; default gles31-minimum for profile mobile, "
-                               "else none",
-                               join(rhi::restriction_names())))
+    app.add_option(
+           "--restrict", arguments.restriction,
+           fmt::format("Hold the device to smaller capabilities: {}; default gles31-minimum for profile mobile, "
+                       "else none",
+                       join(rhi::restriction_names())))
         ->type_name("NAME")
         ->check(one_of(rhi::restriction_names()))
         ->group("Device");
@@ -268,7 +270,8 @@ void add_picture(CLI::App& app, SceneArguments& arguments) {
     app.add_option("-c,--camera", arguments.camera, "Camera by name or number; default: the first")
         ->type_name("NAME")
         ->group("Picture");
-    app.add_option("-e,--env", arguments.environment, "Light from this environment map (.hdr, .exr) instead of the scene's")
+    app.add_option("-e,--env", arguments.environment,
+                   "Light from this environment map (.hdr, .exr) instead of the scene's")
         ->type_name("FILE")
         ->group("Picture");
     app.add_option("--exposure", arguments.exposure_ev, "Stops: light is multiplied by 2^EV; default: metered")
@@ -354,9 +357,10 @@ struct Definition {
         command
             ->add_option_function<std::string>(
                 "-b,--backends", [this](const std::string& list) { compare.scene.backends = split_backends(list, 2); },
-                fmt::format("Two or more of {}, separated by commas, each as NAME[:MODE][:CHECK][:lanes=N][:threads=N]; "
-                            "the first is the reference",
-                            join(backend_names())))
+                fmt::format(
+                    "Two or more of {}, separated by commas, each as NAME[:MODE][:CHECK][:lanes=N][:threads=N]; "
+                    "the first is the reference",
+                    join(backend_names())))
             ->type_name("LIST")
             ->required()
             ->group("Device");
@@ -379,7 +383,8 @@ struct Definition {
         command->add_option("B", diff.b, "The picture to judge, of the same size")->type_name("")->required();
         command->add_option("-o,--output", diff.output, "Write difference pictures and index.html to this folder")
             ->type_name("FOLDER");
-        command->add_option("--tolerance", diff.tolerance, "Judge by this JSON file; default: the figures are only shown")
+        command
+            ->add_option("--tolerance", diff.tolerance, "Judge by this JSON file; default: the figures are only shown")
             ->type_name("FILE");
         add_json(*command, diff.json);
 
@@ -395,7 +400,8 @@ struct Definition {
 
         command = app.add_subcommand("material", "Look into a material: closures, bytes, simplification, a picture");
         command->footer(material_footer);
-        command->add_option("MATERIAL", material.material, "A built-in material, a .json file, or SCENE#NAME")->type_name("");
+        command->add_option("MATERIAL", material.material, "A built-in material, a .json file, or SCENE#NAME")
+            ->type_name("");
         command->add_flag("-l,--list", material.list, "List the built-in materials");
         command->add_flag("--schema", material.schema, "Print the JSON schema of material files, for editors");
         command->add_flag("--full", material.full, "Simplify to one closure, as rays carry it");
@@ -409,7 +415,9 @@ struct Definition {
             ->check(whole_number(4, 1024));
         command->add_flag("--reference", material.reference,
                           "Tell how far the closures are off a random walk through the stack (some seconds)");
-        command->add_option("--eval", material.evaluate, "Print what each closure reflects: view and light, comma separated")
+        command
+            ->add_option("--eval", material.evaluate,
+                         "Print what each closure reflects: view and light, comma separated")
             ->type_name("DIRECTIONS");
         command->add_option("-o,--output", material.output, "Draw it")->type_name("FILE")->check(file_ending({".png"}));
         add_json(*command, material.json);
@@ -457,7 +465,8 @@ struct Definition {
 
         command = app.add_subcommand("completion", "Print a script for tab completion in bash");
         command->footer(completion_footer);
-        command->add_flag("--list", completion.list, "Print what can follow WORDS instead (used by the script)")->group("");
+        command->add_flag("--list", completion.list, "Print what can follow WORDS instead (used by the script)")
+            ->group("");
         command->add_option("WORDS", completion.words)->group("");
     }
     Definition(const Definition&) = delete;
@@ -502,10 +511,12 @@ std::vector<std::string> value_candidates(const std::string& command, const CLI:
     if (name == "--size") return {"1280x720", "1920x1080", "640x360"};
     if (name == "MATERIAL") {
         std::vector<std::string> names{"<file>"};
-        for (const materials::BuiltinMaterial& material : materials::builtin_materials()) names.emplace_back(material.name);
+        for (const materials::BuiltinMaterial& material : materials::builtin_materials())
+            names.emplace_back(material.name);
         return names;
     }
-    if (name == "SCENE" || command == "diff") return name == "SCENE" ? scene_candidates() : std::vector<std::string>{"<file>"};
+    if (name == "SCENE" || command == "diff")
+        return name == "SCENE" ? scene_candidates() : std::vector<std::string>{"<file>"};
     if (type == "FILE") return {"<file>"};
     if (type == "FOLDER") return {"<folder>"};
     return {};
@@ -538,7 +549,8 @@ std::variant<Invocation, int> parse_command_line(int argc, const char* const* ar
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() == 0) return definition.app.exit(error);  // --help, --version
         std::string command = "nacre";
-        if (const auto used = definition.app.get_subcommands(); !used.empty()) command += " " + used.front()->get_name();
+        if (const auto used = definition.app.get_subcommands(); !used.empty())
+            command += " " + used.front()->get_name();
         fmt::print(stderr, "nacre: {}\n`{} --help` tells what can be written here.\n", error.what(), command);
         return static_cast<int>(ExitCode::usage);
     }
@@ -554,7 +566,8 @@ std::vector<std::string> completion_candidates(const std::vector<std::string>& w
     const std::string typed = words.empty() ? "" : words.back();
     std::vector<std::string> candidates;
     if (words.size() <= 1) {
-        for (const CLI::App* command : definition.app.get_subcommands(nullptr)) candidates.push_back(command->get_name());
+        for (const CLI::App* command : definition.app.get_subcommands(nullptr))
+            candidates.push_back(command->get_name());
         candidates.emplace_back("--help");
         candidates.emplace_back("--version");
         return candidates;

@@ -99,14 +99,15 @@ struct CompletionArguments {
     std::vector<std::string> words;  ///< The words typed after "nacre"; the last one is being typed.
 };
 
-using Invocation = std::variant<DevicesArguments, RenderArguments, CompareArguments, DiffArguments, ExplainArguments,
-                                MaterialArguments, StabilityArguments, DemoArguments, CacheArguments, CompletionArguments>;
+using Invocation =
+    std::variant<DevicesArguments, RenderArguments, CompareArguments, DiffArguments, ExplainArguments,
+                 MaterialArguments, StabilityArguments, DemoArguments, CacheArguments, CompletionArguments>;
 
 /// An invocation, or the exit code where everything is said already (help, version, wrong usage).
 std::variant<Invocation, int> parse_command_line(int argc, const char* const* argv);
 
-/// What can follow the words typed so far: subcommands, options, or values of an option ("<file>" and "<folder>" stand for
-/// paths).
+/// What can follow the words typed so far: subcommands, options, or values of an option ("<file>" and "<folder>" stand
+/// for paths).
 std::vector<std::string> completion_candidates(const std::vector<std::string>& words);
 
 /// Reads "1280x720". Returns false where it is not of that form or outside [1, 16384].

@@ -73,8 +73,9 @@ std::string summary(const measure::SceneComparison& comparison) {
         if (b == 0) {
             row.insert(row.end(), {"-", "-", "-", "-"});
         } else {
-            row.insert(row.end(), {fmt::format("{:.2f}", result.final.psnr_db), figure_text(result.final.flip_mean),
-                                   fmt::format("{}", result.final.max_abs_8bit), share_text(result.final.share_above_1)});
+            row.insert(row.end(),
+                       {fmt::format("{:.2f}", result.final.psnr_db), figure_text(result.final.flip_mean),
+                        fmt::format("{}", result.final.max_abs_8bit), share_text(result.final.share_above_1)});
         }
         table.add(std::move(row));
     }

@@ -18,7 +18,8 @@ Attempt<measure::SceneComparison> run_comparison(const SceneSession& scene, cons
                                                  const measure::ComparisonOptions& options) {
     std::vector<RenderSession> sessions;
     for (const std::string& backend : backends) {
-        NACRE_TRY(RenderSession session, scene.start(instance, backend, options.textures && options.only_texture.empty()));
+        NACRE_TRY(RenderSession session,
+                  scene.start(instance, backend, options.textures && options.only_texture.empty()));
         sessions.push_back(std::move(session));
     }
     std::vector<measure::Contestant> contestants;

@@ -52,9 +52,10 @@ Outcome run(const DevicesArguments& arguments) {
         unavailable.push_back({{"backend", backend.backend}, {"reason", backend.error.message()}});
     }
     print_result(arguments.json, text + details);
-    NACRE_CHECK(write_json(arguments.json, Json{{"devices", std::move(devices)}, {"unavailable", std::move(unavailable)}}
-                                                   .dump(2, ' ', false, Json::error_handler_t::replace) +
-                                               "\n"));
+    NACRE_CHECK(
+        write_json(arguments.json, Json{{"devices", std::move(devices)}, {"unavailable", std::move(unavailable)}}.dump(
+                                       2, ' ', false, Json::error_handler_t::replace) +
+                                       "\n"));
     return ExitCode::success;
 }
 

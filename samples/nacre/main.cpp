@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The command `nacre`: devices, render, compare, diff, explain, material, stability, demo, cache, completion. See `nacre --help`.
+// The command `nacre`: devices, render, compare, diff, explain, material, stability, demo, cache, completion. See
+// `nacre --help`.
 #include <fmt/format.h>
 
 #include <cstdio>

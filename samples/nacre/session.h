@@ -37,8 +37,8 @@ class SceneSession {
     /// Loads scene and environment, and checks camera, profile and restriction. Warnings of the scene go to the log.
     static Attempt<SceneSession> open(const SceneArguments& arguments);
 
-    /// Makes a device of `backend` (a spec) and a renderer on it. Intermediates are kept where `keep_intermediates` says
-    /// so, and `SceneArguments::dump` in any case.
+    /// Makes a device of `backend` (a spec) and a renderer on it. Intermediates are kept where `keep_intermediates`
+    /// says so, and `SceneArguments::dump` in any case.
     [[nodiscard]] Attempt<RenderSession> start(const rhi::Instance& instance, const std::string& backend,
                                                bool keep_intermediates) const;
 

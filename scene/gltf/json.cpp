@@ -67,7 +67,8 @@ class Builder final : public nlohmann::json_sax<json> {
             if (const auto end = reason.find(": "); end != std::string::npos) reason.erase(0, end + 2);
         }
         const TextPosition at = text_position(text_, position == 0 ? 0 : position - 1);
-        reject(fmt::format("the JSON text is wrong at line {}, column {}: {}", at.line, at.column, printable(reason, 300)));
+        reject(fmt::format("the JSON text is wrong at line {}, column {}: {}", at.line, at.column,
+                           printable(reason, 300)));
     }
 
   private:

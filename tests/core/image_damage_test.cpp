@@ -32,7 +32,8 @@ std::string read_text(const std::filesystem::path& path) {
 
 std::string sample_png() {
     ImageBytes image{64, 48, 3, 1, {}};
-    for (std::size_t i = 0; i < image.texel_count() * 3; ++i) image.bytes.push_back(static_cast<std::uint8_t>(i * i / 7));
+    for (std::size_t i = 0; i < image.texel_count() * 3; ++i)
+        image.bytes.push_back(static_cast<std::uint8_t>(i * i / 7));
     return text_of(*encode_png(image));
 }
 

@@ -47,9 +47,12 @@ double projected_area(Distribution&& distribution) {
 TEST(Classic, DistributionsCoverTheSurface) {
     Library library;
     for (const double roughness : {0.1, 0.3, 0.6, 1.0})
-        EXPECT_NEAR(projected_area([&](double c) { return library.charlie_distribution(direction(c, 0.0), roughness); }), 1.0, 1e-3);
+        EXPECT_NEAR(
+            projected_area([&](double c) { return library.charlie_distribution(direction(c, 0.0), roughness); }), 1.0,
+            1e-3);
     for (const double alpha : {0.3, 0.6, 1.0})
-        EXPECT_NEAR(projected_area([&](double c) { return library.ashikhmin_distribution(direction(c, 0.0), alpha); }), 1.0, 2e-3)
+        EXPECT_NEAR(projected_area([&](double c) { return library.ashikhmin_distribution(direction(c, 0.0), alpha); }),
+                    1.0, 2e-3)
             << alpha;
 }
 

@@ -41,7 +41,8 @@ double expectation(Library& library, double mean) {
 }
 
 // What is seen of a place is a mean of counts with weights whose sum is 1: with seeds as good as random, the mean over
-// places is off by as much as this one. Where a pixel has few facets and slopes lie far out, counts have means like these.
+// places is off by as much as this one. Where a pixel has few facets and slopes lie far out, counts have means like
+// these.
 TEST(Glints, CountsHaveTheirMean) {
     Library library;
     for (const double mean : {1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 5.0, 19.9})

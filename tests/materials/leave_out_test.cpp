@@ -22,7 +22,8 @@ class SourcesWithout {
             for (const EmbeddedFile& file : files) {
                 std::string text(file.text);
                 const std::string condition = "#ifdef " + macro + "\n";
-                for (std::size_t at = text.find(condition); at != std::string::npos; at = text.find(condition, at + 1)) {
+                for (std::size_t at = text.find(condition); at != std::string::npos;
+                     at = text.find(condition, at + 1)) {
                     text.insert(at + condition.size(), "#error this feature does not exist\n");
                     ++places_;
                 }

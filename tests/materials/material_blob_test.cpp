@@ -24,19 +24,21 @@ TEST(MaterialBlob, HeadersComeBack) {
     std::mt19937 random(7);
     const auto coin = [&] { return (random() & 1u) != 0; };
     for (int i = 0; i < 20'000; ++i) {
-        const MaterialHeader header{.type = static_cast<std::uint16_t>(random()),
-                                    .number = static_cast<std::uint16_t>(random()),
-                                    .alpha_mode = static_cast<AlphaMode>(random() % 3),
-                                    .double_sided = coin(),
-                                    .unlit = coin(),
-                                    .emits = coin(),
-                                    .alpha_cutoff = std::ldexp(static_cast<float>(random()), -32),
-                                    .sideband = coin() ? MaterialHeader::no_sideband : static_cast<std::uint32_t>(random()),
-                                    .textures = static_cast<std::uint8_t>(random() % 128),
-                                    .second_uv = static_cast<std::uint8_t>(random() % 128),
-                                    .transformed = coin()};
+        const MaterialHeader header{
+            .type = static_cast<std::uint16_t>(random()),
+            .number = static_cast<std::uint16_t>(random()),
+            .alpha_mode = static_cast<AlphaMode>(random() % 3),
+            .double_sided = coin(),
+            .unlit = coin(),
+            .emits = coin(),
+            .alpha_cutoff = std::ldexp(static_cast<float>(random()), -32),
+            .sideband = coin() ? MaterialHeader::no_sideband : static_cast<std::uint32_t>(random()),
+            .textures = static_cast<std::uint8_t>(random() % 128),
+            .second_uv = static_cast<std::uint8_t>(random() % 128),
+            .transformed = coin()};
         MaterialBlob blob;
-        for (std::uint32_t row = 1; row < blob_rows; ++row) blob.rows[row] = glm::uvec4(random(), random(), random(), random());
+        for (std::uint32_t row = 1; row < blob_rows; ++row)
+            blob.rows[row] = glm::uvec4(random(), random(), random(), random());
         const MaterialBlob before = blob;
         blob.set_header(header);
         ASSERT_EQ(blob.header(), header);
@@ -74,7 +76,8 @@ TEST(MaterialBlob, PlainSlabsComeBack) {
     const auto color = [&] { return glm::vec3(unit(random), unit(random), unit(random)); };
     for (int i = 0; i < 2'000; ++i) {
         SingleSlab slab;
-        slab.base_color = color(), slab.alpha = unit(random), slab.metallic = unit(random), slab.roughness = unit(random);
+        slab.base_color = color(), slab.alpha = unit(random), slab.metallic = unit(random),
+        slab.roughness = unit(random);
         slab.f0 = color(), slab.f90 = unit(random), slab.emission = (i % 3 == 0 ? 0.0f : 1e6f) * color();
         slab.occlusion_strength = unit(random), slab.normal_scale = 4.0f * unit(random) - 2.0f;
         slab.alpha_mode = static_cast<AlphaMode>(i % 3), slab.alpha_cutoff = unit(random);

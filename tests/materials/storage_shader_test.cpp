@@ -18,8 +18,8 @@ namespace {
 
 using closures::Library;
 
-// What one invocation writes behind the words: subsurface data, roughness of the top, and what the closures reflect that
-// are read back.
+// What one invocation writes behind the words: subsurface data, roughness of the top, and what the closures reflect
+// that are read back.
 constexpr std::uint32_t extra_words = 5;
 
 // The surface's frame is that of the world here.
@@ -67,7 +67,8 @@ class StorageShaderTest : public TreeDeviceTest {
         ASSERT_NE(layout.storage_class, StorageClass::simple);
         const std::vector<glm::vec4> directions = random_directions(random);
         TreeShader tree = tree_shader(flat);
-        tree.defines += fmt::format("#define NACRE_STORED_FRAMES {}\n#define NACRE_STORED_LAYERS\n", layout.frames.size());
+        tree.defines +=
+            fmt::format("#define NACRE_STORED_FRAMES {}\n#define NACRE_STORED_LAYERS\n", layout.frames.size());
         const std::uint32_t words = layout.material_words(), stride = words + extra_words;
         const auto bytes = run_tree(*device_, tree, tree.glsl + storage_writer(flat, layout) + store_text, directions,
                                     std::size_t{4} * stride * direction_pairs);
@@ -101,9 +102,12 @@ class StorageShaderTest : public TreeDeviceTest {
                 if (a == b) continue;
                 ++codes_off;
                 if (format.codec == StorageCodec::color) {
-                    EXPECT_LE(std::abs(static_cast<int>(a & 127u) - static_cast<int>(b & 127u)), 1) << format.name << name;
-                    EXPECT_LE(std::abs(static_cast<int>(a >> 7 & 127u) - static_cast<int>(b >> 7 & 127u)), 1) << format.name;
-                    EXPECT_LE(std::abs(static_cast<int>(a >> 14) - static_cast<int>(b >> 14)), 1) << format.name << name;
+                    EXPECT_LE(std::abs(static_cast<int>(a & 127u) - static_cast<int>(b & 127u)), 1)
+                        << format.name << name;
+                    EXPECT_LE(std::abs(static_cast<int>(a >> 7 & 127u) - static_cast<int>(b >> 7 & 127u)), 1)
+                        << format.name;
+                    EXPECT_LE(std::abs(static_cast<int>(a >> 14) - static_cast<int>(b >> 14)), 1)
+                        << format.name << name;
                 } else {
                     EXPECT_LE(std::abs(static_cast<int>(a) - static_cast<int>(b)), 1) << format.name << name;
                 }
@@ -144,7 +148,8 @@ TEST_P(StorageShaderTest, BuiltinMaterials) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Backends, StorageShaderTest, testing::ValuesIn(TreeDeviceTest::backends), TreeDeviceTest::name_of);
+INSTANTIATE_TEST_SUITE_P(Backends, StorageShaderTest, testing::ValuesIn(TreeDeviceTest::backends),
+                         TreeDeviceTest::name_of);
 
 }  // namespace
 }  // namespace nacre::materials

@@ -71,7 +71,8 @@ TEST(Storage, LayoutHasNoFieldTwiceAndCountsItsBits) {
             EXPECT_EQ(field.offset, bits) << storage_format(field.value).name;
             bits += field.bits;
             EXPECT_TRUE(field.closure == StorageLayout::no_closure || field.closure < flat.topology.closures.size());
-            EXPECT_EQ(++seen[std::tuple(field.closure, field.frame, field.value)], 1) << storage_format(field.value).name;
+            EXPECT_EQ(++seen[std::tuple(field.closure, field.frame, field.value)], 1)
+                << storage_format(field.value).name;
         }
         EXPECT_LE(bits, 32 * layout.material_words());
         EXPECT_TRUE(layout.material_words() == 2 || bits > 32 * (layout.material_words() - 1));
@@ -98,7 +99,9 @@ TEST(Storage, FieldsComeBackWithinAStep) {
         glm::dvec3 mean(0.0);
         double mean_number = 0.0;
         for (std::uint32_t pixel = 0; pixel < 64; ++pixel) {
-            const auto dither = [&](std::uint32_t which) { return library.ordered_dither(pixel % 8, pixel / 8, which); };
+            const auto dither = [&](std::uint32_t which) {
+                return library.ordered_dither(pixel % 8, pixel / 8, which);
+            };
             const glm::dvec3 back = library.unpack_color(library.pack_color(color, {dither(0), dither(1), dither(2)}));
             for (int channel = 0; channel < 3; ++channel) {
                 const double step = channel == 2 ? 1.0 / 63 : 1.0 / 127;
@@ -108,7 +111,8 @@ TEST(Storage, FieldsComeBackWithinAStep) {
             const double unit = library.unpack_unit(library.pack_unit(number, 6, dither(0)), 6);
             EXPECT_LE(std::abs(unit - number), 1.0 / 63);
             mean_number += unit / 64.0;
-            EXPECT_LE(std::abs(library.unpack_signed(library.pack_signed(with_sign, 8, dither(0)), 8) - with_sign), 1.0 / 127);
+            EXPECT_LE(std::abs(library.unpack_signed(library.pack_signed(with_sign, 8, dither(0)), 8) - with_sign),
+                      1.0 / 127);
             const double back_length =
                 library.unpack_logarithm(library.pack_logarithm(length, 10, low, octaves, dither(0)), 10, low, octaves);
             EXPECT_LE(std::abs(std::log2(back_length / length)), octaves / 1022);

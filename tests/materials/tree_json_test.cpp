@@ -202,7 +202,8 @@ TEST(TreeJson, BuildingBlocksAreNodes) {
     // Every block with nothing said is a material.
     for (const BuildingBlock& block : building_blocks()) {
         const std::string body = block.has_base ? R"({"base": {"slab": {}}})" : "{}";
-        EXPECT_TRUE(parse_material(R"({"nacre_material": 1, "root": {")" + std::string(block.name) + "\": " + body + "}}", "m"))
+        EXPECT_TRUE(
+            parse_material(R"({"nacre_material": 1, "root": {")" + std::string(block.name) + "\": " + body + "}}", "m"))
             << block.name;
     }
 }
@@ -216,12 +217,15 @@ TEST(TreeJson, FaultsInBlocksAreNamed) {
     EXPECT_THAT(message(R"({"principle": {}})"), HasSubstr("principled"));
     EXPECT_THAT(message(R"({"principled": {"base_colour": 1}})"), HasSubstr("unknown member 'base_colour'"));
     EXPECT_THAT(message(R"({"principled": {"base_colour": 1}})"), HasSubstr("base_color"));
-    EXPECT_THAT(message(R"({"principled": {"metallic": 2}})"), HasSubstr("root.principled.metallic: it is 2. It must be in [0, 1]"));
+    EXPECT_THAT(message(R"({"principled": {"metallic": 2}})"),
+                HasSubstr("root.principled.metallic: it is 2. It must be in [0, 1]"));
     EXPECT_THAT(message(R"({"principled": {"metallic": [0, 1, 0]}})"), HasSubstr("it has 3 numbers, not 1"));
-    EXPECT_THAT(message(R"({"principled": {"anisotropic": {"value": 1, "texture": {"image": 0}}}})"), HasSubstr("takes no texture"));
+    EXPECT_THAT(message(R"({"principled": {"anisotropic": {"value": 1, "texture": {"image": 0}}}})"),
+                HasSubstr("takes no texture"));
     EXPECT_THAT(message(R"({"principled": {"frame": 1}})"), HasSubstr("index below 1"));
     EXPECT_THAT(message(R"({"coated_layer": {}})"), HasSubstr("it has no 'base'"));
-    EXPECT_THAT(message(R"({"standard_surface_opaque": {"transmission_weight": 1}})"), HasSubstr("transmission_weight"));
+    EXPECT_THAT(message(R"({"standard_surface_opaque": {"transmission_weight": 1}})"),
+                HasSubstr("transmission_weight"));
     EXPECT_THAT(message(R"({"standard_surface_opaque": {"specular_weight": {"texture": {"image": 0}},
                                                         "specular_color": {"texture": {"image": 0}}}})"),
                 HasSubstr("'f0' has two textures"));
@@ -249,10 +253,12 @@ TEST(TreeJson, TheSchemaInTheTreeIsTheOneOfTheFormat) {
     for (const SlabField& field : slab_fields()) EXPECT_TRUE(slab.contains(field.name)) << field.name;
     const auto& kinds = schema["$defs"]["node"]["oneOf"];
     for (const BuildingBlock& block : building_blocks()) {
-        const auto found = std::ranges::find_if(kinds, [&](const auto& kind) { return kind["properties"].contains(block.name); });
+        const auto found =
+            std::ranges::find_if(kinds, [&](const auto& kind) { return kind["properties"].contains(block.name); });
         ASSERT_NE(found, kinds.end()) << block.name;
         for (const BlockInput& input : block.inputs)
-            EXPECT_TRUE((*found)["properties"][std::string(block.name)]["properties"].contains(input.name)) << input.name;
+            EXPECT_TRUE((*found)["properties"][std::string(block.name)]["properties"].contains(input.name))
+                << input.name;
     }
 }
 

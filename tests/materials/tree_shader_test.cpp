@@ -117,7 +117,8 @@ TEST_P(TreeShaderTest, TexturesAndVertexColorsMultiplyTheirInputs) {
     compare(*flatten(tree), *flatten(plain), random);
 }
 
-INSTANTIATE_TEST_SUITE_P(Backends, TreeShaderTest, testing::ValuesIn(TreeDeviceTest::backends), TreeDeviceTest::name_of);
+INSTANTIATE_TEST_SUITE_P(Backends, TreeShaderTest, testing::ValuesIn(TreeDeviceTest::backends),
+                         TreeDeviceTest::name_of);
 
 // Materials of one topology share a shader, whatever their numbers are.
 TEST(TreeShader, TextDependsOnTopologyAndFeaturesOnly) {

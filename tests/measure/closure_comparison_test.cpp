@@ -45,10 +45,12 @@ class ClosureComparison : public testing::Test {
         for (const StorageField& field : layout_.fields) {
             if (field.value != value) continue;
             std::uint64_t bits = pixel.words[field.offset / 32];
-            if (field.offset / 32 + 1 < pixel.words.size()) bits |= std::uint64_t{pixel.words[field.offset / 32 + 1]} << 32;
+            if (field.offset / 32 + 1 < pixel.words.size())
+                bits |= std::uint64_t{pixel.words[field.offset / 32 + 1]} << 32;
             bits += static_cast<std::uint64_t>(change) << (field.offset % 32);
             pixel.words[field.offset / 32] = static_cast<std::uint32_t>(bits);
-            if (field.offset / 32 + 1 < pixel.words.size()) pixel.words[field.offset / 32 + 1] = static_cast<std::uint32_t>(bits >> 32);
+            if (field.offset / 32 + 1 < pixel.words.size())
+                pixel.words[field.offset / 32 + 1] = static_cast<std::uint32_t>(bits >> 32);
             return pixel;
         }
         ADD_FAILURE() << "no such field";
@@ -75,7 +77,8 @@ TEST_F(ClosureComparison, OneStepIsNoDifferenceAndTwoAre) {
     EXPECT_EQ(one->difference.differing, 1u);
     EXPECT_EQ(one->difference.fields_differing, 0u);
     EXPECT_EQ(two->difference.fields_differing, 1u);
-    for (const FieldDifference& field : two->difference.fields) EXPECT_EQ(field.differing, field.name == "f0") << field.name;
+    for (const FieldDifference& field : two->difference.fields)
+        EXPECT_EQ(field.differing, field.name == "f0") << field.name;
     EXPECT_NEAR(two->difference.max_abs, 2.0 / 127, 1e-9);
 }
 

@@ -52,7 +52,8 @@ TEST(CrossBackendTest, EachFigureIsJudged) {
     EXPECT_THAT(first([](BackendResult& r) { r.final.psnr_db = std::nan(""); }), HasSubstr("PSNR"));
     EXPECT_THAT(first([](BackendResult& r) { r.final.flip_mean = 0.0051; }), HasSubstr("FLIP"));
     EXPECT_THAT(first([](BackendResult& r) { r.final.share_above_1 = 0.0011; }), HasSubstr("1/255"));
-    EXPECT_THAT(first([](BackendResult& r) { r.missing = {"depth"}; }), HasSubstr("'depth' of the reference is missing"));
+    EXPECT_THAT(first([](BackendResult& r) { r.missing = {"depth"}; }),
+                HasSubstr("'depth' of the reference is missing"));
     EXPECT_THAT(first([](BackendResult& r) { r.added = {"extra"}; }), HasSubstr("'extra' is not in the reference"));
     EXPECT_THAT(first([](BackendResult& r) { r.radiance_scan.nan = 3; }), HasSubstr("3 NaN"));
     EXPECT_THAT(first([](BackendResult& r) { r.final.max_abs_8bit = 5; }, {.max_abs_8bit = 4}), HasSubstr("byte"));

@@ -177,8 +177,8 @@ TEST(ChiSquareTest, TellsOnePercent) {
     EXPECT_LT(other.smallest_probability(), 1e-9);
 }
 
-// Bins around an axis that lies low are cut by the surface, where a density ends: their integrals are those of fine sums,
-// to a part of what their counts vary by.
+// Bins around an axis that lies low are cut by the surface, where a density ends: their integrals are those of fine
+// sums, to a part of what their counts vary by.
 TEST(ChiSquareTest, BinsEndAtTheSurface) {
     const auto density = [](const glm::dvec3& w) { return w.z > 0.0 ? 0.5 / std::numbers::pi : 0.0; };
     const DirectionBins bins{.rings = 16, .axis = {std::sqrt(1.0 - 0.09), 0.0, 0.3}, .smallest_angle = 0.5};
@@ -191,7 +191,8 @@ TEST(ChiSquareTest, BinsEndAtTheSurface) {
     double sum = 0.0;
     for (const double share : test.expected()) sum += share;
     EXPECT_NEAR(sum, 1.0, 1e-6);
-    // Each ring of a hemisphere of constant density is cut by the surface over a part of its circle: by rings of angles.
+    // Each ring of a hemisphere of constant density is cut by the surface over a part of its circle: by rings of
+    // angles.
     const double growth = std::log1p(1.0 / bins.smallest_angle) / bins.rings;
     for (int ring = 0; ring < bins.rings; ++ring) {
         const double low = std::numbers::pi * bins.smallest_angle * std::expm1(growth * ring),
@@ -205,7 +206,8 @@ TEST(ChiSquareTest, BinsEndAtTheSurface) {
             exact += std::acos(std::clamp(edge, -1.0, 1.0)) / std::numbers::pi * std::sin(angle) * (high - low) / steps;
         }
         double found = 0.0;
-        for (int sector = 0; sector < 2 * bins.rings; ++sector) found += test.expected()[ring * 2 * bins.rings + sector];
+        for (int sector = 0; sector < 2 * bins.rings; ++sector)
+            found += test.expected()[ring * 2 * bins.rings + sector];
         EXPECT_NEAR(found, exact, 1e-6) << ring;
     }
 }

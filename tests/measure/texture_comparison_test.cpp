@@ -18,7 +18,8 @@ using rhi::Format;
 using testing::HasSubstr;
 
 template <typename T>
-TextureData texture(Format format, std::uint32_t width, const std::vector<T>& values, std::vector<BitField> fields = {}) {
+TextureData texture(Format format, std::uint32_t width, const std::vector<T>& values,
+                    std::vector<BitField> fields = {}) {
     TextureData data{.name = "texture", .format = format, .width = width, .height = 1, .fields = std::move(fields)};
     data.bytes.resize(values.size() * sizeof(T));
     std::memcpy(data.bytes.data(), values.data(), data.bytes.size());

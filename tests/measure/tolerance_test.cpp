@@ -26,7 +26,8 @@ TEST(ToleranceTest, EmptyFileKeepsTheDefaults) {
 
 TEST(ToleranceTest, MembersAreRead) {
     const auto result = parse_tolerance(R"({"fields_differing": 0.1, "final": {"psnr_db": 60, "flip_mean": 0.2,
-        "share_above_1": 0.3, "max_abs_8bit": 4}, "textures": {"depth": {"max_abs": 1e-3, "differing": 1}}})", "t.json");
+        "share_above_1": 0.3, "max_abs_8bit": 4}, "textures": {"depth": {"max_abs": 1e-3, "differing": 1}}})",
+                                        "t.json");
     ASSERT_TRUE(result) << result.error().message();
     EXPECT_EQ(result->fields_differing, 0.1);
     EXPECT_EQ(result->psnr_db, 60.0);

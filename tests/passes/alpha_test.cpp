@@ -67,7 +67,8 @@ TEST_P(Alpha, WallsHidePanes) {
 TEST_P(Alpha, MaskedSurfacesEndAtTheirCutoff) {
     scene::Scene scene = empty_scene();
     scene::Primitive primitive = sheet(0.0f);
-    for (const glm::vec3& position : primitive.positions) primitive.colors.emplace_back(1, 1, 1, 0.5f * (position.x + 1.0f));
+    for (const glm::vec3& position : primitive.positions)
+        primitive.colors.emplace_back(1, 1, 1, 0.5f * (position.x + 1.0f));
     materials::MaterialDescription material = glow({0.5f, 0.5f, 0.5f}, 1.0f, materials::AlphaMode::mask);
     material.alpha_cutoff = 0.5f;
     place(scene, primitive, add_material(scene, material));

@@ -54,15 +54,18 @@ TEST_P(Closures, LightingAgreesWithWhatIsStored) {
     Library library;
     library.tints = materials::tints_of(materials::default_specular_tables());
     const passes::Field normal_field = *std::ranges::find(passes::gbuffer_fields(), "normal", &passes::Field::name);
-    const passes::Field roughness_field = *std::ranges::find(passes::gbuffer_fields(), "roughness", &passes::Field::name);
+    const passes::Field roughness_field =
+        *std::ranges::find(passes::gbuffer_fields(), "roughness", &passes::Field::name);
     for (const char* name : {"complex-coat", "silks-under-plastic", "single-sss", "special-speclut"}) {
         scene::Scene scene = empty_scene();
         place(scene, ball(), add_material(scene, described(name)));
         scene::Light sun = directional_light({-0.4f, -0.8f, -1.0f}, 2.0f);
         sun.casts_shadows = false;
         scene.lights.push_back(sun);
-        const Shot shot = render(scene, {.width = side, .height = side, .exposure_ev = 0.0f, .keep_intermediates = true});
-        const auto words_0 = shot.intermediate<std::uint32_t>("material.0"), words_1 = shot.intermediate<std::uint32_t>("material.1");
+        const Shot shot =
+            render(scene, {.width = side, .height = side, .exposure_ev = 0.0f, .keep_intermediates = true});
+        const auto words_0 = shot.intermediate<std::uint32_t>("material.0"),
+                   words_1 = shot.intermediate<std::uint32_t>("material.1");
         const auto tops = shot.intermediate<std::uint32_t>("top_layer");
         std::vector<std::vector<std::uint32_t>> slices;
         for (const passes::IntermediateDescription& description : shot.renderer->intermediates()) {
@@ -135,8 +138,10 @@ TEST_P(Closures, VertexColorsMultiplyTheBaseColor) {
         const Shot by_vertex = shot_of(true), by_material = shot_of(false);
         glm::vec3 sum(0.0f);
         for (std::uint32_t i = 0; i < side * side; ++i) {
-            const glm::vec3 a = by_vertex.radiance_at(i % side, i / side), b = by_material.radiance_at(i % side, i / side);
-            for (int channel = 0; channel < 3; ++channel) ASSERT_NEAR(a[channel], b[channel], 0.02f * b[channel] + 2e-3f) << i;
+            const glm::vec3 a = by_vertex.radiance_at(i % side, i / side),
+                            b = by_material.radiance_at(i % side, i / side);
+            for (int channel = 0; channel < 3; ++channel)
+                ASSERT_NEAR(a[channel], b[channel], 0.02f * b[channel] + 2e-3f) << i;
             sum += b;
         }
         EXPECT_GT(sum.b, 1.3f * sum.g);
@@ -163,7 +168,8 @@ TEST_P(Closures, ReflectionsHaveTheTintsOfTheScenesTables) {
         for (std::uint32_t i = 0; i < side * side; ++i) sum += glm::dvec3(shot.radiance_at(i % side, i / side));
         return sum;
     };
-    const glm::dvec3 white = shot_of(glm::vec3(1.0f)), red = shot_of({0.5f, 0.0f, 0.0f}), black = shot_of(glm::vec3(0.0f));
+    const glm::dvec3 white = shot_of(glm::vec3(1.0f)), red = shot_of({0.5f, 0.0f, 0.0f}),
+                     black = shot_of(glm::vec3(0.0f));
     EXPECT_GT(white.g, 10.0);
     EXPECT_NEAR(red.r - black.r, 0.5 * (white.r - black.r), 0.01 * white.r);
     EXPECT_NEAR(red.g, black.g, 1e-3 * white.g);
@@ -195,9 +201,9 @@ TEST_P(Closures, WhatLiesBehindShowsThroughAsMuchAsTheTreeSays) {
     }
 }
 
-// A coat that covers nearly nothing leaves the picture of the plain slab: both are shaded by the same closures. Compared
-// are means over rings of a ball, since stored closures are dithered.
-// What white textures multiply is what it was. Two textures of a blended tree once broke a driver.
+// A coat that covers nearly nothing leaves the picture of the plain slab: both are shaded by the same closures.
+// Compared are means over rings of a ball, since stored closures are dithered. What white textures multiply is what it
+// was. Two textures of a blended tree once broke a driver.
 TEST_P(Closures, WhiteTexturesLeaveWhatShowsThrough) {
     const auto seen = [&](bool is_textured) {
         scene::Scene scene = empty_scene();

@@ -50,14 +50,16 @@ TEST_P(CrossBackend, BuiltinScenesAgree) {
                     break;
                 }
             }
-            EXPECT_LT(static_cast<double>(differing), 5e-4 * static_cast<double>(words.size())) << name << " " << texture;
+            EXPECT_LT(static_cast<double>(differing), 5e-4 * static_cast<double>(words.size()))
+                << name << " " << texture;
         }
         double sum = 0.0;
         for (std::size_t i = 0; i < mine.picture.bytes.size(); ++i) {
             const double d = (static_cast<double>(mine.picture.bytes[i]) - first.picture.bytes[i]) / 255.0;
             sum += d * d;
         }
-        const double psnr = sum == 0.0 ? 200.0 : -10.0 * std::log10(sum / static_cast<double>(mine.picture.bytes.size()));
+        const double psnr =
+            sum == 0.0 ? 200.0 : -10.0 * std::log10(sum / static_cast<double>(mine.picture.bytes.size()));
         EXPECT_GT(psnr, 50.0) << name;
         // A black or unlit picture is no evidence.
         std::size_t lit = 0;

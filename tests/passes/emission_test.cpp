@@ -56,7 +56,8 @@ TEST_P(Emission, IsTintedByTheLayersAbove) {
     }
     const glm::vec3 seen = shot.radiance_at(16, 16);
     EXPECT_LT(expected.b, 1.0) << "the coat takes blue light";
-    for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(seen[channel], expected[channel], 0.01 * expected[channel]);
+    for (int channel = 0; channel < 3; ++channel)
+        EXPECT_NEAR(seen[channel], expected[channel], 0.01 * expected[channel]);
 }
 
 // Faces that coincide give their light once, and hidden ones none.

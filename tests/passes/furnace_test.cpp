@@ -18,7 +18,8 @@ scene::Scene white_room(float metallic, float ior) {
         material.ior = ior;
         const std::uint32_t index = add_material(scene, material);
         glm::mat4 transform(1.0f);
-        transform[3] = glm::vec4(-0.75f + 0.5f * static_cast<float>(i % 4), -0.75f + 0.5f * static_cast<float>(i / 4), 0, 1);
+        transform[3] =
+            glm::vec4(-0.75f + 0.5f * static_cast<float>(i % 4), -0.75f + 0.5f * static_cast<float>(i / 4), 0, 1);
         place(scene, scene::sphere(0.22f, 48, 24), index, transform);
     }
     return scene;

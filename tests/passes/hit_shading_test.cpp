@@ -60,7 +60,8 @@ int add_sampler(scene::Scene& scene, scene::MipFilter mip) {
 materials::MaterialDescription textured(scene::Scene& scene, int sampler) {
     materials::MaterialDescription material{.name = "textured"};
     const auto texture = [&](scene::ColorSpace space, int uv_set, bool normals = false) {
-        return materials::TextureReference{.image = add_noise(scene, space, normals), .sampler = sampler, .uv_set = uv_set};
+        return materials::TextureReference{
+            .image = add_noise(scene, space, normals), .sampler = sampler, .uv_set = uv_set};
     };
     material.base_color = {0.9f, 0.7f, 0.5f, 1.0f};
     material.base_color_texture = texture(scene::ColorSpace::srgb, 0);
@@ -83,7 +84,8 @@ materials::MaterialDescription built_in(std::string_view name) {
     return material;
 }
 
-/// Checks that 128 bytes and a place are all that shading needs: words of the compute shader are those of the base pass.
+/// Checks that 128 bytes and a place are all that shading needs: words of the compute shader are those of the base
+/// pass.
 class Comparison {
   public:
     explicit Comparison(const Shot& shot) : shot_(shot) {}
@@ -100,12 +102,14 @@ class Comparison {
         return values;
     }
 
-    /// Counts pixels of a class, and those whose words differ. `slices`: words beyond the targets that each of them has.
+    /// Counts pixels of a class, and those whose words differ. `slices`: words beyond the targets that each of them
+    /// has.
     void run(passes::PixelClass of_class, std::uint32_t slices = 0) {
         const auto classes = shot_.intermediate<std::uint32_t>("material.0");
         std::vector<bool> same(classes.size(), true);
         const auto compare = [&](const char* name, std::uint32_t layer) {
-            const auto drawn = shot_.intermediate<std::uint32_t>(name, layer), shaded = hits<std::uint32_t>(name, layer);
+            const auto drawn = shot_.intermediate<std::uint32_t>(name, layer),
+                       shaded = hits<std::uint32_t>(name, layer);
             ASSERT_EQ(drawn.size(), shaded.size());
             for (std::size_t i = 0; i < drawn.size(); ++i) {
                 if (drawn[i] == shaded[i] || (classes[i] & 3u) != static_cast<std::uint32_t>(of_class)) continue;
@@ -134,11 +138,13 @@ class Comparison {
 bool can_shade_hits(RendererTest& test, const scene::Scene& scene) {
     if (test.device().capabilities().storage_in_fragment) return true;
     const auto renderer = passes::Renderer::create(
-        test.device(), scene, {.profile = HitShading::GetParam().profile, .width = side, .height = side, .shade_hits = true});
+        test.device(), scene,
+        {.profile = HitShading::GetParam().profile, .width = side, .height = side, .shade_hits = true});
     EXPECT_FALSE(renderer);
     if (!renderer) {
         EXPECT_EQ(renderer.error().code, ErrorCode::unsupported);
-        EXPECT_NE(renderer.error().message().find("storage_in_fragment"), std::string::npos) << renderer.error().message();
+        EXPECT_NE(renderer.error().message().find("storage_in_fragment"), std::string::npos)
+            << renderer.error().message();
     }
     return false;
 }
@@ -146,8 +152,8 @@ bool can_shade_hits(RendererTest& test, const scene::Scene& scene) {
 const passes::RenderOptions options{
     .width = side, .height = side, .exposure_ev = 0.0f, .keep_intermediates = true, .shade_hits = true};
 
-/// To the bit on the CPU, where both shaders compute the same operations in the same order; other compilers may contract one
-/// of them, and devices without descriptor indexing may enlarge textures.
+/// To the bit on the CPU, where both shaders compute the same operations in the same order; other compilers may
+/// contract one of them, and devices without descriptor indexing may enlarge textures.
 void expect_equal(const Comparison& comparison, int least_pixels, const std::string& what) {
     EXPECT_GE(comparison.pixels, least_pixels) << what;
     if (HitShading::GetParam().backend.starts_with("cpu")) {
@@ -178,7 +184,8 @@ TEST_P(HitShading, PlainSlabsAreWhatTheBasePassStores) {
 TEST_P(HitShading, DifferentialsChooseTheLevelsOfTheDraws) {
     const bool is_cpu = GetParam().backend.starts_with("cpu");
     for (const scene::Filter minification : {scene::Filter::nearest, scene::Filter::linear}) {
-        // Filters that are all linear are anisotropic, which Mesa does for draws and not for differentials that are given.
+        // Filters that are all linear are anisotropic, which Mesa does for draws and not for differentials that are
+        // given.
         if (minification == scene::Filter::linear && !is_cpu) continue;
         scene::Scene scene = empty_scene();
         scene.samplers.push_back({.minification = minification, .mip = scene::MipFilter::linear});
@@ -235,7 +242,8 @@ TEST_P(HitShading, AlphaTestsAreThoseOfTheDraws) {
     const auto emission = comparison.hits<glm::vec4>("emission");
     const auto classes = shot.intermediate<std::uint32_t>("material.0");
     int wrong = 0;
-    for (std::size_t i = 0; i < classes.size(); ++i) wrong += (emission[i].a == 1.0f) != ((classes[i] & 3u) != 0) ? 1 : 0;
+    for (std::size_t i = 0; i < classes.size(); ++i)
+        wrong += (emission[i].a == 1.0f) != ((classes[i] & 3u) != 0) ? 1 : 0;
     EXPECT_EQ(wrong, 0) << "the alpha test must let be what is drawn";
 }
 
@@ -281,8 +289,8 @@ TEST_P(HitShading, ManyKindsAtOnce) {
     int i = 0;
     scene::Primitive no_tangents = ball();
     no_tangents.tangents.clear();
-    for (const auto& material : {coated, brushed, textured(scene, sampler), coated, built_in("complex-coat"), coated, coated,
-                                 brushed, matte(glm::vec3(0.5f))}) {
+    for (const auto& material : {coated, brushed, textured(scene, sampler), coated, built_in("complex-coat"), coated,
+                                 coated, brushed, matte(glm::vec3(0.5f))}) {
         glm::mat4 world = third;
         world[3] = glm::vec4(0.66f * static_cast<float>(i % 3 - 1), 0.66f * static_cast<float>(i / 3 - 1), 0.0f, 1.0f);
         if (i == 1) world[0] = -world[0];  // mirrored
@@ -468,15 +476,18 @@ TEST_P(HitShading, WrongKindsAreErrors) {
     const auto error_of = [&](std::vector<std::shared_ptr<materials::CustomMaterial>> wrong) {
         scene::Scene scene = empty_scene();
         for (auto& material : wrong) place(scene, ball(), add_material(scene, custom(std::move(material))));
-        const auto renderer = passes::Renderer::create(device(), scene, {.profile = GetParam().profile, .width = 16, .height = 16});
+        const auto renderer =
+            passes::Renderer::create(device(), scene, {.profile = GetParam().profile, .width = 16, .height = 16});
         EXPECT_FALSE(renderer);
         return renderer ? Error{} : renderer.error();
     };
     EXPECT_EQ(error_of({std::make_shared<Wrong>("two words")}).code, ErrorCode::invalid_argument);
     EXPECT_EQ(error_of({std::make_shared<Wrong>("")}).code, ErrorCode::invalid_argument);
     EXPECT_EQ(error_of({std::make_shared<Wrong>("a", "", 513)}).code, ErrorCode::invalid_argument);
-    EXPECT_EQ(error_of({std::make_shared<Wrong>("a", "x"), std::make_shared<Wrong>("a", "y")}).code, ErrorCode::invalid_argument);
-    EXPECT_EQ(error_of({std::make_shared<Wrong>("a", "x"), std::make_shared<Wrong>("a", "x", 1)}).code, ErrorCode::invalid_argument);
+    EXPECT_EQ(error_of({std::make_shared<Wrong>("a", "x"), std::make_shared<Wrong>("a", "y")}).code,
+              ErrorCode::invalid_argument);
+    EXPECT_EQ(error_of({std::make_shared<Wrong>("a", "x"), std::make_shared<Wrong>("a", "x", 1)}).code,
+              ErrorCode::invalid_argument);
     const Error syntax = error_of({std::make_shared<Wrong>("broken", "vec4 broken_base_color() { return 1; }\n")});
     EXPECT_EQ(syntax.code, ErrorCode::shader_compile);
     EXPECT_NE(syntax.message().find("passes/kinds/broken.glsl:1"), std::string::npos) << syntax.message();
@@ -530,7 +541,8 @@ TEST_P(HitShading, PropertiesCanBeAskedFor) {
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(sent[c], static_cast<float>(3 - c), 2e-3f) << c;
 }
 
-// Ray cones and levels that are given, against the level of the closed form: texels that a cone covers, as a power of two.
+// Ray cones and levels that are given, against the level of the closed form: texels that a cone covers, as a power of
+// two.
 TEST_P(HitShading, ConesAndLevelsChooseMips) {
     scene::Scene scene = empty_scene();
     materials::MaterialDescription material{.name = "textured"};

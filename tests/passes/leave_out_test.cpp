@@ -27,11 +27,11 @@ int add_image(scene::Scene& scene, scene::ColorSpace color_space) {
 
 const OptionalFeature optional_features[] = {
     {"emission", Feature::emission, [](scene::Scene& s) { s.materials[0].emissive = glm::vec3(1.0f); }},
-    {"alpha test", Feature::alpha_test, [](scene::Scene& s) { s.materials[0].alpha_mode = materials::AlphaMode::mask; }},
+    {"alpha test", Feature::alpha_test,
+     [](scene::Scene& s) { s.materials[0].alpha_mode = materials::AlphaMode::mask; }},
     {"blend", Feature::blend, [](scene::Scene& s) { s.materials[1].alpha_mode = materials::AlphaMode::blend; }},
     {"unlit", Feature::unlit, [](scene::Scene& s) { s.materials[1].unlit = true; }},
-    {"shadows", Feature::shadows,
-     [](scene::Scene& s) { s.lights[0].casts_shadows = true; },
+    {"shadows", Feature::shadows, [](scene::Scene& s) { s.lights[0].casts_shadows = true; },
      [](scene::Scene& s) {
          s.lights.push_back(directional_light({0, -1, -1}, 1.0f));
          s.lights[0].casts_shadows = false;
@@ -86,8 +86,8 @@ void expect_equal_plans(const passes::Plan& a, const passes::Plan& b, const char
     EXPECT_EQ(a.texture_bytes, b.texture_bytes) << feature;
 }
 
-// For every optional feature, a scene without it gives the plan (passes, SPIR-V, memory) of a renderer that does not know it;
-// and a scene with it gives another one, so that the comparison means something.
+// For every optional feature, a scene without it gives the plan (passes, SPIR-V, memory) of a renderer that does not
+// know it; and a scene with it gives another one, so that the comparison means something.
 TEST_P(LeaveOut, WhatASceneDoesNotUseCostsNothing) {
     const passes::RenderOptions options{.width = 64, .height = 64, .exposure_ev = 0.0f};
     for (const OptionalFeature& optional : optional_features) {

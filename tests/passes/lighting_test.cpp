@@ -96,7 +96,8 @@ TEST_P(Lighting, AgreesWithTheClosureInDoublePrecision) {
             if (field("pixel_class", words_0[i])[0] != 1.0f) continue;
             const glm::dvec3 diffuse(field("diffuse_r", words_0[i])[0], field("diffuse_g", words_0[i])[0],
                                      field("diffuse_b", words_0[i])[0]);
-            const glm::dvec3 f0(field("f0_r", words_1[i])[0], field("f0_g", words_1[i])[0], field("f0_b", words_1[i])[0]);
+            const glm::dvec3 f0(field("f0_r", words_1[i])[0], field("f0_g", words_1[i])[0],
+                                field("f0_b", words_1[i])[0]);
             const auto n = field("normal", tops[i]);
             const glm::dvec3 normal = glm::normalize(glm::dvec3(n[0], n[1], n[2]));
             if (normal.z < 1e-3) continue;

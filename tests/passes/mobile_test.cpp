@@ -25,9 +25,9 @@ scene::Scene builtin(const char* name) {
     return scene ? *std::move(scene) : empty_scene();
 }
 
-// Integer targets and compute shaders in place of float targets: the same picture as profile "low" as far as nine bits of
-// blended and emitted color go. (Profiles differ in tables and shadows; those are equal between mobile and low but for
-// the environment, which is why the scene gets a plain one.)
+// Integer targets and compute shaders in place of float targets: the same picture as profile "low" as far as nine bits
+// of blended and emitted color go. (Profiles differ in tables and shadows; those are equal between mobile and low but
+// for the environment, which is why the scene gets a plain one.)
 TEST_P(Mobile, ShowsWhatLowShows) {
     for (const char* name : {"builtin:alpha", "builtin:cornell"}) {
         scene::Scene scene = builtin(name);

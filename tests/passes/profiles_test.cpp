@@ -41,7 +41,8 @@ TEST(Profiles, MobileHoldsOnOpenGlEs31) {
         EXPECT_LE(16 + 128 * 64 + 32 * 64, 16384);
         EXPECT_LE(profile.lights, 128u);
         EXPECT_LE(profile.shadow_views, 32u);
-        EXPECT_TRUE(profile.shadow_filter_width == 1 || profile.shadow_filter_width == 3 || profile.shadow_filter_width == 5);
+        EXPECT_TRUE(profile.shadow_filter_width == 1 || profile.shadow_filter_width == 3 ||
+                    profile.shadow_filter_width == 5);
     }
 }
 

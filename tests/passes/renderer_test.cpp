@@ -202,7 +202,8 @@ materials::MaterialDescription matte(const glm::vec3& albedo) {
 glm::dvec3 in_frame_of(const glm::dvec3& normal, const glm::dvec3& direction) {
     const glm::dvec3 axis = std::abs(normal.x) < 0.7 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
     const glm::dvec3 tangent = glm::normalize(axis - normal * glm::dot(axis, normal));
-    return {glm::dot(direction, tangent), glm::dot(direction, glm::cross(normal, tangent)), glm::dot(direction, normal)};
+    return {glm::dot(direction, tangent), glm::dot(direction, glm::cross(normal, tangent)),
+            glm::dot(direction, normal)};
 }
 
 double matte_value(const RenderVariant& variant, const glm::dvec3& normal, const glm::dvec3& to_viewer,

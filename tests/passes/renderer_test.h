@@ -23,8 +23,8 @@
 ///         EXPECT_NEAR(shot.radiance_at(32, 32).r, 1.0f, 2e-3f);
 ///     }
 ///
-/// Devices have our validation, the driver's and verify mode on; any message fails the test. Every picture is searched for
-/// values that are negative or not finite.
+/// Devices have our validation, the driver's and verify mode on; any message fails the test. Every picture is searched
+/// for values that are negative or not finite.
 
 namespace nacre::test {
 

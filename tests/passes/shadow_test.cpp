@@ -18,7 +18,8 @@ scene::Scene floor_and_tile(bool masked = false) {
     if (masked) {
         // A texture whose left half is not there.
         scene::Image image{.name = "half", .width = 2, .height = 1, .has_alpha = true};
-        image.pixels = std::make_shared<std::vector<std::uint8_t>>(std::vector<std::uint8_t>{255, 255, 255, 0, 255, 255, 255, 255});
+        image.pixels = std::make_shared<std::vector<std::uint8_t>>(
+            std::vector<std::uint8_t>{255, 255, 255, 0, 255, 255, 255, 255});
         scene.images.push_back(image);
         scene.samplers[0] = {.magnification = scene::Filter::nearest,
                              .minification = scene::Filter::nearest,
@@ -35,7 +36,8 @@ scene::Scene floor_and_tile(bool masked = false) {
 
 std::uint32_t column_of(float x) { return static_cast<std::uint32_t>((x + 1.0f) * 0.5f * side); }
 
-/// From where to where the middle row of the floor is darker than half of its light at x = -0.9, to the right of the tile.
+/// From where to where the middle row of the floor is darker than half of its light at x = -0.9, to the right of the
+/// tile.
 glm::vec2 shadow_range(const Shot& shot, const scene::Scene&, float from, float to, float lit_at) {
     const std::uint32_t row = side / 2 + 3;
     const float lit = shot.radiance_at(column_of(lit_at), row).g;
@@ -89,7 +91,8 @@ TEST_P(Shadow, OfASpotLightLiesWhereItMust) {
 
 TEST_P(Shadow, OfAPointLightLiesWhereItMust) {
     scene::Scene scene = floor_and_tile();
-    scene.lights.push_back({.name = "lamp", .kind = scene::LightKind::point, .intensity = 5.0f, .position = {-0.6f, 0, 1.2f}});
+    scene.lights.push_back(
+        {.name = "lamp", .kind = scene::LightKind::point, .intensity = 5.0f, .position = {-0.6f, 0, 1.2f}});
     const Shot shot = render(scene, {.width = side, .height = side, .exposure_ev = 0.0f});
     EXPECT_NEAR(shadow_range(shot, scene, 0.21f, 0.75f, 0.7f).y, 0.6f, 0.03f);
     EXPECT_EQ(shot.radiance_at(column_of(0.4f), side / 2).g, 0.0f);

@@ -104,8 +104,8 @@ TEST(IncludeOrder, HeavyLibrariesStayInTheFolderThatUsesThem) {
     std::map<std::string, std::string> heavy_headers;
     for (const Include& include : includes) {
         if (!include.file.ends_with(".h") || include.file.starts_with("tests/") || include.is_quoted) continue;
-        for (const char* library : {"nlohmann/json.hpp", "glslang/", "spirv_cross", "spirv-tools/", "png.h", "jpeglib.h",
-                                    "OpenEXR/", "CLI/", "spdlog/", "tbb/", "tiny_gltf"})
+        for (const char* library : {"nlohmann/json.hpp", "glslang/", "spirv_cross", "spirv-tools/", "png.h",
+                                    "jpeglib.h", "OpenEXR/", "CLI/", "spdlog/", "tbb/", "tiny_gltf"})
             if (include.target.starts_with(library)) heavy_headers[include.file] = include.target;
     }
     const auto folder_of = [](const std::string& path) { return path.substr(0, path.rfind('/')); };

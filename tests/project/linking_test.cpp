@@ -15,7 +15,8 @@ std::string libraries_of(const std::string& program) {
     std::FILE* pipe = popen(("ldd '" + program + "' 2>&1").c_str(), "r");
     if (!pipe) return output;
     std::array<char, 4096> buffer;
-    while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) output.append(buffer.data(), count);
+    while (const std::size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe))
+        output.append(buffer.data(), count);
     pclose(pipe);
     return output;
 }

@@ -16,8 +16,8 @@ namespace nacre {
 inline const std::filesystem::path source_root = NACRE_SOURCE_DIR;
 
 /// The folders that hold source code, in no order.
-inline constexpr std::string_view source_folders[] = {"core",   "rhi",     "backends", "materials", "scene", "raytracing",
-                                                      "passes", "measure", "samples",  "tests",     "cmake"};
+inline constexpr std::string_view source_folders[] = {
+    "core", "rhi", "backends", "materials", "scene", "raytracing", "passes", "measure", "samples", "tests", "cmake"};
 
 /// Paths below the root of all files of the source folders with one of these endings, sorted.
 inline std::vector<std::string> source_files(std::initializer_list<std::string_view> endings) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every blend factor and operation against the formula, two sources, different blending of several targets, write masks.
+// Every blend factor and operation against the formula, two sources, different blending of several targets, write
+// masks.
 #include "tests/rhi/backend_test.h"
 
 #include <algorithm>
@@ -13,7 +14,8 @@ using namespace rhi;
 using Color = std::array<float, 4>;
 using Texel = std::array<std::uint8_t, 4>;
 
-// Exact in 8 bits, since a device may blend with the precision of the target: what is left is the rounding of two products.
+// Exact in 8 bits, since a device may blend with the precision of the target: what is left is the rounding of two
+// products.
 constexpr Color source{180 / 255.0f, 75 / 255.0f, 130 / 255.0f, 153 / 255.0f};
 constexpr Color second_source{100 / 255.0f, 230 / 255.0f, 51 / 255.0f, 204 / 255.0f};
 constexpr Color destination{51 / 255.0f, 153 / 255.0f, 229 / 255.0f, 102 / 255.0f};
@@ -44,7 +46,8 @@ float factor(BlendFactor which, std::size_t channel) {
     return 0;
 }
 
-float blended(BlendOperation operation, BlendFactor source_factor, BlendFactor destination_factor, std::size_t channel) {
+float blended(BlendOperation operation, BlendFactor source_factor, BlendFactor destination_factor,
+              std::size_t channel) {
     const float d = destination[channel], s = source[channel];
     const float a = s * factor(source_factor, channel), b = d * factor(destination_factor, channel);
     switch (operation) {
@@ -71,7 +74,8 @@ class Blending : public BackendTest {
                     std::to_string(i) + ";\n";
         if (two_sources) body += "layout(location = 0, index = 1) out vec4 second;\n";
         body += "void main() {\n";
-        for (std::size_t i = 0; i < targets.size(); ++i) body += "color" + std::to_string(i) + " = " + literal(source) + ";\n";
+        for (std::size_t i = 0; i < targets.size(); ++i)
+            body += "color" + std::to_string(i) + " = " + literal(source) + ";\n";
         if (two_sources) body += "second = " + literal(second_source) + ";\n";
         return ok(device().create_graphics_pipeline({.vertex = shader(ShaderStage::vertex, fullscreen_vertex),
                                                      .fragment = shader(ShaderStage::fragment, body + "}"),
@@ -108,13 +112,14 @@ TEST_P(Blending, EveryFactorAndOperation) {
         const GraphicsPipeline with = pipeline({{.format = Format::rgba8_unorm, .blend = blend}}, two_sources);
         const Texel found = draw(with, std::span(&picture, 1))[0];
         for (std::size_t c = 0; c < 4; ++c) {
-            const float expected = c == 3 ? blended(blend.alpha_operation, blend.source_alpha, blend.destination_alpha, 3)
-                                          : blended(blend.color_operation, blend.source_color, blend.destination_color, c);
+            const float expected = c == 3
+                                       ? blended(blend.alpha_operation, blend.source_alpha, blend.destination_alpha, 3)
+                                       : blended(blend.color_operation, blend.source_color, blend.destination_color, c);
             EXPECT_NEAR(found[c], expected * 255.0f, tolerance)
                 << "channel " << c << ", color " << static_cast<int>(blend.color_operation) << ": "
-                << static_cast<int>(blend.source_color) << ", " << static_cast<int>(blend.destination_color) << ", alpha "
-                << static_cast<int>(blend.alpha_operation) << ": " << static_cast<int>(blend.source_alpha) << ", "
-                << static_cast<int>(blend.destination_alpha);
+                << static_cast<int>(blend.source_color) << ", " << static_cast<int>(blend.destination_color)
+                << ", alpha " << static_cast<int>(blend.alpha_operation) << ": " << static_cast<int>(blend.source_alpha)
+                << ", " << static_cast<int>(blend.destination_alpha);
         }
         device().destroy(with);
     };
@@ -130,7 +135,8 @@ TEST_P(Blending, EveryFactorAndOperation) {
     for (const BlendOperation operation : {BlendOperation::add, BlendOperation::subtract,
                                            BlendOperation::reverse_subtract, BlendOperation::minimum,
                                            BlendOperation::maximum})
-        for (const BlendOperation alpha : {BlendOperation::add, BlendOperation::reverse_subtract, BlendOperation::maximum})
+        for (const BlendOperation alpha :
+             {BlendOperation::add, BlendOperation::reverse_subtract, BlendOperation::maximum})
             check({.enabled = true, .source_color = BlendFactor::source_alpha, .destination_color = BlendFactor::one,
                    .color_operation = operation, .source_alpha = BlendFactor::one,
                    .destination_alpha = BlendFactor::one, .alpha_operation = alpha});
@@ -187,7 +193,8 @@ TEST_P(Blending, SrgbTargetsBlendInLinearLight) {
     const Texture picture = target(Format::rgba8_srgb, 2, 2);
     const BlendState half{.enabled = true, .source_color = BlendFactor::constant_color,
                           .destination_color = BlendFactor::one_minus_constant_color};
-    const Texel found = draw(pipeline({{.format = Format::rgba8_srgb, .blend = half}}, false), std::span(&picture, 1))[0];
+    const Texel found =
+        draw(pipeline({{.format = Format::rgba8_srgb, .blend = half}}, false), std::span(&picture, 1))[0];
     for (std::size_t c = 0; c < 3; ++c) {
         const float linear = source[c] * constants[c] + destination[c] * (1 - constants[c]);
         const float encoded = linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f;
@@ -201,7 +208,8 @@ TEST_P(Blending, FloatTargetsKeepWhatIsBeyondOne) {
     const BlendState add{.enabled = true, .source_color = BlendFactor::one, .destination_color = BlendFactor::one};
     const GraphicsPipeline with = pipeline({{.format = Format::rgba16_float, .blend = add}}, false);
     CommandList list = device().create_command_list("add");
-    list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear, .clear = {.floating = {8, 4, -2, 1}}}}});
+    list.begin_render_pass(
+        {.color = {{.view = picture, .load = LoadOperation::clear, .clear = {.floating = {8, 4, -2, 1}}}}});
     list.set_pipeline(with);
     list.draw({.vertex_count = 3});
     list.end_render_pass();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What each format means: as a sampled texture, as a color target and as a vertex attribute, against a decoder of our own.
+// What each format means: as a sampled texture, as a color target and as a vertex attribute, against a decoder of our
+// own.
 #include "tests/rhi/backend_test.h"
 #include "tests/rhi/texel_values.h"
 
@@ -69,19 +70,27 @@ TEST_P(Formats, SampledTexelsMeanWhatTheyShould) {
     for (const Format format : formats_with(capabilities(), FormatSupport::sampled)) {
         const std::string p(prefix(info(format).kind));
         const auto texels = random_texels(format, width * height, static_cast<std::uint32_t>(format));
-        const Texture texture = ok(device().create_texture({.format = format, .width = width, .height = height,
-                                                            .usage = TextureUsage::sampled | TextureUsage::copy_destination,
-                                                            .name = title(format)}));
+        const Texture texture =
+            ok(device().create_texture({.format = format,
+                                        .width = width,
+                                        .height = height,
+                                        .usage = TextureUsage::sampled | TextureUsage::copy_destination,
+                                        .name = title(format)}));
         ok(device().write_texture(texture, texels));
         const bool is_integer = info(format).is_integer();
         const ComputePipeline pipeline = compute(
             "layout(local_size_x = 16, local_size_y = 4) in;\n"
-            "layout(set = 0, binding = 0) uniform " + p + "sampler2D source;\n"
-            "layout(set = 0, binding = 1) buffer Results { uvec4 results[]; };\n"
-            "void main() {\n"
-            "    ivec2 at = ivec2(gl_LocalInvocationID.xy);\n"
-            "    results[at.y * 16 + at.x] = " + (is_integer ? "uvec4(" : "floatBitsToUint(") + "texelFetch(source, at, 0));\n"
-            "}", {}, title(format));
+            "layout(set = 0, binding = 0) uniform " +
+                p +
+                "sampler2D source;\n"
+                "layout(set = 0, binding = 1) buffer Results { uvec4 results[]; };\n"
+                "void main() {\n"
+                "    ivec2 at = ivec2(gl_LocalInvocationID.xy);\n"
+                "    results[at.y * 16 + at.x] = " +
+                (is_integer ? "uvec4(" : "floatBitsToUint(") +
+                "texelFetch(source, at, 0));\n"
+                "}",
+            {}, title(format));
         const Buffer results = buffer(width * height * 16, BufferUsage::storage);
         const Sampler sampler = ok(device().create_sampler(
             {.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest}));
@@ -97,8 +106,9 @@ TEST_P(Formats, SampledTexelsMeanWhatTheyShould) {
         const std::size_t bytes = info(format).block_bytes;
         for (std::size_t i = 0; i < found.size(); ++i)
             // Normalized numbers become floats by a division that may be off by a little; sRGB by a table or a curve.
-            expect_near(decode_texel(format, std::span(texels).subspan(i * bytes, bytes)), found[i], info(format).kind, 4,
-                        info(format).kind == FormatKind::srgb ? 0.5 : 0.02, title(format) + " texel " + std::to_string(i));
+            expect_near(decode_texel(format, std::span(texels).subspan(i * bytes, bytes)), found[i], info(format).kind,
+                        4, info(format).kind == FormatKind::srgb ? 0.5 : 0.02,
+                        title(format) + " texel " + std::to_string(i));
         device().destroy(texture);
         device().destroy(results);
     }
@@ -121,9 +131,11 @@ TEST_P(Formats, ColorTargetsKeepWhatIsDrawn) {
              .name = title(format)}));
         const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(
             {.vertex = shader(ShaderStage::vertex, fullscreen_vertex),
-             .fragment = shader(ShaderStage::fragment, "layout(location = 0) out " + p + "vec4 color;\nvoid main() { color = " +
-                                                           p + "vec4(" + values + "); }"),
-             .color_targets = {{.format = format}}, .name = title(format)}));
+             .fragment = shader(ShaderStage::fragment, "layout(location = 0) out " + p +
+                                                           "vec4 color;\nvoid main() { color = " + p + "vec4(" +
+                                                           values + "); }"),
+             .color_targets = {{.format = format}},
+             .name = title(format)}));
         CommandList list = device().create_command_list(title(format));
         list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear}}, .name = title(format)});
         list.set_scissor({.x = 0, .y = 0, .width = 3, .height = 1});
@@ -169,14 +181,16 @@ TEST_P(Formats, VertexAttributesMeanWhatTheyShould) {
                     // A column of the picture for each instance.
                     vec2 corner = vec2((gl_VertexIndex << 1) & 2, gl_VertexIndex & 2) * 0.5;
                     gl_Position = vec4((float(gl_InstanceIndex) + corner.x * 2.0) * 0.5 - 1.0, corner.y * 4.0 - 1.0, 0, 1);
-                    bits = )" + (is_integer ? "uvec4(value);" : "floatBitsToUint(value);") + "\n}"),
+                    bits = )" + (is_integer ? "uvec4(value);" : "floatBitsToUint(value);") +
+                                                       "\n}"),
              .fragment = shader(ShaderStage::fragment, R"(
                 layout(location = 0) flat in uvec4 bits;
                 layout(location = 0) out uvec4 color;
                 void main() { color = bits; })"),
              .vertex_buffers = {{.stride = stride, .per_instance = true}},
              .vertex_attributes = {{.location = 5, .buffer = 0, .offset = offset, .format = format}},
-             .color_targets = {{.format = Format::rgba32_uint}}, .name = title(format)}));
+             .color_targets = {{.format = Format::rgba32_uint}},
+             .name = title(format)}));
         CommandList list = device().create_command_list(title(format));
         list.begin_render_pass({.color = {{.view = picture, .load = LoadOperation::clear}}, .name = title(format)});
         list.set_pipeline(pipeline);
@@ -186,17 +200,19 @@ TEST_P(Formats, VertexAttributesMeanWhatTheyShould) {
         run(std::move(list));
         const auto found = read<std::array<std::uint32_t, 4>>(picture);
         for (std::size_t i = 0; i < count; ++i)
-            expect_near(decode_texel(format, std::span(values).subspan(i * bytes, bytes)), found[i], info(format).kind, 4,
-                        0.02, title(format) + " instance " + std::to_string(i));
+            expect_near(decode_texel(format, std::span(values).subspan(i * bytes, bytes)), found[i], info(format).kind,
+                        4, 0.02, title(format) + " instance " + std::to_string(i));
         device().destroy(pipeline);
     }
 }
 
 TEST_P(Formats, SeveralTargetsOfDifferentFormats) {
     // The G-buffer of a small profile: three targets of packed words.
-    const Texture words[] = {target(Format::r32_uint, 8, 8), target(Format::r32_uint, 8, 8), target(Format::r32_uint, 8, 8)};
-    GraphicsPipelineDesc desc{.vertex = shader(ShaderStage::vertex, fullscreen_vertex),
-                              .fragment = shader(ShaderStage::fragment, R"(
+    const Texture words[] = {target(Format::r32_uint, 8, 8), target(Format::r32_uint, 8, 8),
+                             target(Format::r32_uint, 8, 8)};
+    GraphicsPipelineDesc desc{
+        .vertex = shader(ShaderStage::vertex, fullscreen_vertex),
+        .fragment = shader(ShaderStage::fragment, R"(
                                   layout(location = 0) out uint material_0;
                                   layout(location = 1) out uint material_1;
                                   layout(location = 2) out uint top_layer;
@@ -206,8 +222,8 @@ TEST_P(Formats, SeveralTargetsOfDifferentFormats) {
                                       material_1 = 0xdeadbeefu;
                                       top_layer = ~at.y;
                                   })"),
-                              .color_targets = {{.format = Format::r32_uint}, {.format = Format::r32_uint}, {.format = Format::r32_uint}},
-                              .name = "base pass"};
+        .color_targets = {{.format = Format::r32_uint}, {.format = Format::r32_uint}, {.format = Format::r32_uint}},
+        .name = "base pass"};
     const GraphicsPipeline pipeline = ok(device().create_graphics_pipeline(desc));
     CommandList list = device().create_command_list("base pass");
     list.begin_render_pass({.color = {{.view = words[0], .load = LoadOperation::discard},
@@ -217,7 +233,8 @@ TEST_P(Formats, SeveralTargetsOfDifferentFormats) {
     list.draw({.vertex_count = 3});
     list.end_render_pass();
     run(std::move(list));
-    const auto first = read<std::uint32_t>(words[0]), second = read<std::uint32_t>(words[1]), third = read<std::uint32_t>(words[2]);
+    const auto first = read<std::uint32_t>(words[0]), second = read<std::uint32_t>(words[1]),
+               third = read<std::uint32_t>(words[2]);
     for (std::uint32_t y = 0; y < 8; ++y)
         for (std::uint32_t x = 0; x < 8; ++x) {
             ASSERT_EQ(first[y * 8 + x], x | y << 16);

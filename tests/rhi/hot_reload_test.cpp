@@ -107,8 +107,9 @@ TEST_P(HotReload, ComputeFollowsToo) {
     PipelineReloader pipelines(device(), compiler);
     const auto fill = ok(pipelines.add(ComputePipelineDesc{.name = "fill"}, {.path = "fill.comp"}));
     const Buffer words = buffer(4, BufferUsage::storage);
-    const BindGroup group = ok(device().create_bind_group(
-        {.layout = ok(device().bind_group_layout(pipelines.get(fill), 0)), .entries = {{.binding = 0, .buffer = words}}}));
+    const BindGroup group =
+        ok(device().create_bind_group({.layout = ok(device().bind_group_layout(pipelines.get(fill), 0)),
+                                       .entries = {{.binding = 0, .buffer = words}}}));
     const auto value = [&] {
         CommandList list = device().create_command_list("fill");
         list.set_pipeline(pipelines.get(fill));

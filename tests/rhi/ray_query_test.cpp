@@ -131,13 +131,15 @@ Reference trace(const Mesh& mesh, const Ray& ray, Accept&& accept) {
         const double determinant = -dot(direction, normal);
         if (determinant == 0) continue;
         const Vector q = cross(to_origin, direction);
-        const double u = dot(e2, q) / determinant, v = -dot(e1, q) / determinant, t = dot(to_origin, normal) / determinant;
+        const double u = dot(e2, q) / determinant, v = -dot(e1, q) / determinant,
+                     t = dot(to_origin, normal) / determinant;
         nearest_edge = std::min(nearest_edge, std::max({-u, -v, u + v - 1}) >= 0 ? std::max({-u, -v, u + v - 1})
                                                                                  : std::min({u, v, 1 - u - v}));
         if (u < 0 || v < 0 || u + v > 1 || t <= ray.t_min || t >= ray.t_max) continue;
         const bool is_front = dot(direction, normal) < 0;
         if (!accept(i, is_front)) continue;
-        if (t < best.t) second = best.t, best.t = t, best.primitive = i, best.u = u, best.v = v, best.is_front = is_front;
+        if (t < best.t)
+            second = best.t, best.t = t, best.primitive = i, best.u = u, best.v = v, best.is_front = is_front;
         else second = std::min(second, t);
     }
     best.margin = std::min(nearest_edge, second - best.t);
@@ -148,13 +150,17 @@ class Scene {
   public:
     Scene(BackendTest& test, const Mesh& mesh, bool opaque = true, bool allow_update = false) : test_(test) {
         vertices = test.buffer_of<float>(mesh.positions, BufferUsage::acceleration_structure_input, "vertices");
-        bottom = test.ok(test.device().create_acceleration_structure(
-            {.level = AccelerationStructureLevel::bottom,
-             .geometries = {{.opaque = opaque, .primitive_count = mesh.triangles(), .vertex_count = mesh.triangles() * 3}},
-             .allow_update = allow_update,
-             .name = "bottom"}));
-        top = test.ok(test.device().create_acceleration_structure(
-            {.level = AccelerationStructureLevel::top, .max_instances = 8, .allow_update = allow_update, .name = "top"}));
+        bottom =
+            test.ok(test.device().create_acceleration_structure({.level = AccelerationStructureLevel::bottom,
+                                                                 .geometries = {{.opaque = opaque,
+                                                                                 .primitive_count = mesh.triangles(),
+                                                                                 .vertex_count = mesh.triangles() * 3}},
+                                                                 .allow_update = allow_update,
+                                                                 .name = "bottom"}));
+        top = test.ok(test.device().create_acceleration_structure({.level = AccelerationStructureLevel::top,
+                                                                   .max_instances = 8,
+                                                                   .allow_update = allow_update,
+                                                                   .name = "top"}));
     }
     void build(std::vector<AccelerationStructureInstance> instances = {}) {
         if (instances.empty()) instances.resize(1);
@@ -188,7 +194,8 @@ void expect_agreement(const Mesh& mesh, const std::vector<Ray>& rays, const std:
                       const std::function<bool(std::size_t, std::uint32_t, bool)>& accept) {
     std::size_t compared = 0, hit_count = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
-        const Reference expected = trace(mesh, rays[i], [&](std::uint32_t p, bool front) { return accept(i, p, front); });
+        const Reference expected =
+            trace(mesh, rays[i], [&](std::uint32_t p, bool front) { return accept(i, p, front); });
         if (expected.margin < 1e-4) continue;
         ++compared;
         const bool is_hit = std::isfinite(expected.t);
@@ -228,7 +235,8 @@ TEST_P(RayQueries, LimitsAndCullingAgreeWithDoublePrecision) {
         rays[i].flags = i % 3 == 0 ? 0u : i % 3 == 1 ? 0x10u : 0x20u;
     }
     const std::vector<Hit> hits = scene.trace(rays);
-    expect_agreement(mesh, rays, hits, [](std::size_t i, std::uint32_t, bool front) { return i % 3 == 0 || (i % 3 == 1) == front; });
+    expect_agreement(mesh, rays, hits,
+                     [](std::size_t i, std::uint32_t, bool front) { return i % 3 == 0 || (i % 3 == 1) == front; });
 }
 
 TEST_P(RayQueries, RaysThatSkipOrCullEverythingHitNothing) {
@@ -248,9 +256,9 @@ TEST_P(RayQueries, RaysThatSkipOrCullEverythingHitNothing) {
     EXPECT_EQ(hits_with(opaque, 0x40, 0xff), std::pair(std::size_t{0}, std::size_t{0}));   // Cull opaque.
     EXPECT_EQ(hits_with(opaque, 0x80, 0xff).first, all);                                   // Cull what is not.
     EXPECT_EQ(hits_with(opaque, 0x100, 0xff), std::pair(std::size_t{0}, std::size_t{0}));  // Skip triangles.
-    EXPECT_EQ(hits_with(opaque, 0x4, 0xff).first, all);                                    // Terminate on the first hit.
+    EXPECT_EQ(hits_with(opaque, 0x4, 0xff).first, all);  // Terminate on the first hit.
     EXPECT_EQ(hits_with(opaque, 0, 0).first, 0u);
-    EXPECT_EQ(hits_with(opaque, 0x2, 0xff).first, 0u);                                     // No opaque: nobody confirms.
+    EXPECT_EQ(hits_with(opaque, 0x2, 0xff).first, 0u);  // No opaque: nobody confirms.
     EXPECT_GT(hits_with(opaque, 0x2, 0xff).second, all);
     EXPECT_EQ(hits_with(other, 0, 0xff).first, 0u);
     EXPECT_GT(hits_with(other, 0, 0xff).second, all);
@@ -296,7 +304,8 @@ TEST_P(RayQueries, InstancesHaveTransformsMasksAndNumbers) {
     const auto ray = [](float x, std::uint32_t mask) {
         return Ray{.origin = {x, 0, -2}, .direction = {0, 0, 2}, .mask = mask};
     };
-    const std::vector<Hit> hits = scene.trace({ray(-5, 0xff), ray(5, 0xff), ray(-5, 2), ray(5, 2), ray(5, 1), ray(0, 4), ray(20, 0xff)});
+    const std::vector<Hit> hits =
+        scene.trace({ray(-5, 0xff), ray(5, 0xff), ray(-5, 2), ray(5, 2), ray(5, 1), ray(0, 4), ray(20, 0xff)});
     EXPECT_EQ(hits[0].type, 1u);
     EXPECT_FLOAT_EQ(hits[0].t, 3.0f);
     EXPECT_EQ(hits[0].instance, 0u);
@@ -326,7 +335,8 @@ TEST_P(RayQueries, UpdatesFollowTheVertices) {
     ok(device().write_buffer(scene.vertices, std::as_bytes(std::span(mesh.positions))));
     CommandList list = device().create_command_list("update");
     list.update_acceleration_structure(scene.bottom, std::array{GeometrySource{.vertices = scene.vertices}});
-    list.update_acceleration_structure(scene.top, std::array{AccelerationStructureInstance{.bottom_level = scene.bottom}});
+    list.update_acceleration_structure(scene.top,
+                                       std::array{AccelerationStructureInstance{.bottom_level = scene.bottom}});
     run(std::move(list));
     const std::vector<Ray> rays = random_rays(1000, 10);
     expect_agreement(mesh, rays, scene.trace(rays), [](std::size_t, std::uint32_t, bool) { return true; });
@@ -361,7 +371,8 @@ TEST_P(RayQueries, VerticesAndRaysThatAreNoNumbersHitNothing) {
     scene.build();
     std::vector<Ray> rays = random_rays(1000, 14);
     Mesh without = mesh;
-    for (std::size_t i = 0; i < mesh.positions.size(); i += 36) std::fill_n(without.positions.begin() + static_cast<std::ptrdiff_t>(i), 9, 0.0f);
+    for (std::size_t i = 0; i < mesh.positions.size(); i += 36)
+        std::fill_n(without.positions.begin() + static_cast<std::ptrdiff_t>(i), 9, 0.0f);
     expect_agreement(without, rays, scene.trace(rays), [](std::size_t, std::uint32_t p, bool) { return p % 4 != 0; });
     if (!device().adapter().backend.starts_with("cpu")) return;  // Other devices may do as they like with such rays.
     const float infinity = std::numeric_limits<float>::infinity();
@@ -383,13 +394,14 @@ TEST_P(RayQueries, NoRaySlipsThroughSharedEdges) {
     std::vector<std::array<float, 3>> points;
     for (int y = 0; y <= cells; ++y)
         for (int x = 0; x <= cells; ++x)
-            points.push_back({100.3f + static_cast<float>(x) + 0.3f * unit(random), 70.7f + static_cast<float>(y) + 0.3f * unit(random),
-                              50 + 0.5f * unit(random)});
+            points.push_back({100.3f + static_cast<float>(x) + 0.3f * unit(random),
+                              70.7f + static_cast<float>(y) + 0.3f * unit(random), 50 + 0.5f * unit(random)});
     const auto point = [&](int x, int y) { return points[static_cast<std::size_t>(y * (cells + 1) + x)]; };
     Mesh mesh;
     for (int y = 0; y < cells; ++y)
         for (int x = 0; x < cells; ++x)
-            for (const auto& corner : {point(x, y), point(x + 1, y), point(x, y + 1), point(x, y + 1), point(x + 1, y), point(x + 1, y + 1)})
+            for (const auto& corner :
+                 {point(x, y), point(x + 1, y), point(x, y + 1), point(x, y + 1), point(x + 1, y), point(x + 1, y + 1)})
                 mesh.positions.insert(mesh.positions.end(), corner.begin(), corner.end());
     Scene scene(*this, mesh);
     scene.build();
@@ -401,7 +413,8 @@ TEST_P(RayQueries, NoRaySlipsThroughSharedEdges) {
         // Not at the vertices: Embree's promise ends at edges (docs/ray-tracing.md).
         const float along = 0.01f + 0.98f * unit(random);
         ray.origin = {112.0f + unit(random), 82.0f + unit(random), -3 - 10 * unit(random)};
-        for (std::size_t axis = 0; axis < 3; ++axis) ray.direction[axis] = from[axis] + along * (to[axis] - from[axis]) - ray.origin[axis];
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            ray.direction[axis] = from[axis] + along * (to[axis] - from[axis]) - ray.origin[axis];
     }
     std::size_t missed = 0;
     for (const Hit& hit : scene.trace(rays)) missed += hit.type == 0;
@@ -412,7 +425,8 @@ TEST_P(RayQueries, ArraysOfQueriesAndMatricesWork) {
     SKIP_WITHOUT(capabilities().ray_query);
     Scene scene(*this, Mesh{{-1, -1, 0, 1, -1, 0, 0, 1, 0}});
     scene.build({{.transform = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 4, 8}}});
-    const std::vector<Hit> hits = scene.trace(std::vector<Ray>(32, Ray{.origin = {0, 0, -2}, .direction = {0, 0, 1}}), declarations + R"(
+    const std::vector<Hit> hits =
+        scene.trace(std::vector<Ray>(32, Ray{.origin = {0, 0, -2}, .direction = {0, 0, 1}}), declarations + R"(
         void main() {
             uint i = gl_GlobalInvocationID.x;
             rayQueryEXT queries[2];

@@ -39,7 +39,8 @@ double reference_texel(int x, int y, AddressMode u, AddressMode v, double border
 double reference(double u, double v, Filter filter, AddressMode address_u, AddressMode address_v, double border) {
     const double x = u * size, y = v * size;
     if (filter == Filter::nearest)
-        return reference_texel(static_cast<int>(std::floor(x)), static_cast<int>(std::floor(y)), address_u, address_v, border);
+        return reference_texel(static_cast<int>(std::floor(x)), static_cast<int>(std::floor(y)), address_u, address_v,
+                               border);
     const double left = std::floor(x - 0.5), top = std::floor(y - 0.5), a = x - 0.5 - left, b = y - 0.5 - top;
     const int i = static_cast<int>(left), j = static_cast<int>(top);
     const auto at = [&](int dx, int dy) { return reference_texel(i + dx, j + dy, address_u, address_v, border); };
@@ -79,9 +80,12 @@ class Sampling : public BackendTest {
         for (std::uint32_t y = 0; y < size; ++y)
             for (std::uint32_t x = 0; x < size; ++x)
                 texels[y * size + x] = {texel_red(static_cast<int>(x), static_cast<int>(y)), 0, 0, 255};
-        const Texture texture = ok(device().create_texture({.format = Format::rgba8_unorm, .width = size, .height = size,
-                                                            .usage = TextureUsage::sampled | TextureUsage::copy_destination,
-                                                            .name = "pattern"}));
+        const Texture texture =
+            ok(device().create_texture({.format = Format::rgba8_unorm,
+                                        .width = size,
+                                        .height = size,
+                                        .usage = TextureUsage::sampled | TextureUsage::copy_destination,
+                                        .name = "pattern"}));
         ok(device().write_texture(texture, std::as_bytes(std::span(texels))));
         return texture;
     }
@@ -112,16 +116,16 @@ TEST_P(Sampling, FiltersAndAddressModes) {
         {AddressMode::mirrored_repeat, AddressMode::repeat}};
     for (const Filter filter : {Filter::nearest, Filter::linear}) {
         for (const auto& [u, v] : modes) {
-            const Sampler sampler = ok(device().create_sampler({.magnify = filter, .minify = filter, .mip = Filter::nearest,
-                                                                .address_u = u, .address_v = v}));
+            const Sampler sampler = ok(device().create_sampler(
+                {.magnify = filter, .minify = filter, .mip = Filter::nearest, .address_u = u, .address_v = v}));
             const auto found = evaluate(texture, sampler, "textureLod(source, uv, 0.0)");
             for (std::uint32_t y = 0; y < pictures; ++y)
                 for (std::uint32_t x = 0; x < pictures; ++x) {
                     const double expected = reference((x + 0.5) / 16 - 1.75, (y + 0.5) / 16 - 1.75, filter, u, v, 0);
                     // Weights have at least 8 bits (1/256 of the difference of two texels in each direction).
                     ASSERT_NEAR(found[y * pictures + x][0], expected, filter == Filter::nearest ? 0.001 : 0.006)
-                        << x << ", " << y << ", filter " << static_cast<int>(filter) << ", modes " << static_cast<int>(u)
-                        << ", " << static_cast<int>(v);
+                        << x << ", " << y << ", filter " << static_cast<int>(filter) << ", modes "
+                        << static_cast<int>(u) << ", " << static_cast<int>(v);
                 }
         }
     }
@@ -187,17 +191,23 @@ TEST_P(Sampling, ImplicitLevelsAndBias) {
 
 TEST_P(Sampling, CubesAndVolumesAreFiltered) {
     // A volume whose value grows along z alone.
-    const Texture volume = ok(device().create_texture({.dimension = TextureDimension::d3, .format = Format::r8_unorm,
-                                                       .width = 2, .height = 2, .depth = 4,
-                                                       .usage = TextureUsage::sampled | TextureUsage::copy_destination}));
+    const Texture volume =
+        ok(device().create_texture({.dimension = TextureDimension::d3,
+                                    .format = Format::r8_unorm,
+                                    .width = 2,
+                                    .height = 2,
+                                    .depth = 4,
+                                    .usage = TextureUsage::sampled | TextureUsage::copy_destination}));
     std::vector<std::uint8_t> texels;
     for (int z = 0; z < 4; ++z) texels.insert(texels.end(), 4, static_cast<std::uint8_t>(60 * z));
     ok(device().write_texture(volume, std::as_bytes(std::span(texels))));
     const Sampler clamp = ok(device().create_sampler({.address_u = AddressMode::clamp_to_edge,
                                                       .address_v = AddressMode::clamp_to_edge,
                                                       .address_w = AddressMode::clamp_to_edge}));
-    EXPECT_NEAR(evaluate(volume, clamp, "textureLod(source, vec3(0.5, 0.5, 0.5), 0.0)", "sampler3D")[0][0] * 255, 90, 1);
-    EXPECT_NEAR(evaluate(volume, clamp, "textureLod(source, vec3(0.5, 0.5, 2.0), 0.0)", "sampler3D")[0][0] * 255, 180, 1);
+    EXPECT_NEAR(evaluate(volume, clamp, "textureLod(source, vec3(0.5, 0.5, 0.5), 0.0)", "sampler3D")[0][0] * 255, 90,
+                1);
+    EXPECT_NEAR(evaluate(volume, clamp, "textureLod(source, vec3(0.5, 0.5, 2.0), 0.0)", "sampler3D")[0][0] * 255, 180,
+                1);
 
     // A cube whose faces have one value each, in the order +x, -x, +y, -y, +z, -z.
     const Texture cube = ok(device().create_texture({.dimension = TextureDimension::cube, .format = Format::r8_unorm,
@@ -207,7 +217,8 @@ TEST_P(Sampling, CubesAndVolumesAreFiltered) {
         const std::vector<std::uint8_t> value(4, static_cast<std::uint8_t>(40 * face));
         ok(device().write_texture(cube, std::as_bytes(std::span(value)), 0, face));
     }
-    const char* directions[] = {"1, 0.1, 0.2", "-1, 0.1, 0.2", "0.1, 1, 0.2", "0.1, -1, 0.2", "0.1, 0.2, 1", "0.1, 0.2, -1"};
+    const char* directions[] = {"1, 0.1, 0.2",  "-1, 0.1, 0.2", "0.1, 1, 0.2",
+                                "0.1, -1, 0.2", "0.1, 0.2, 1",  "0.1, 0.2, -1"};
     for (int face = 0; face < 6; ++face)
         EXPECT_NEAR(evaluate(cube, clamp, std::string("textureLod(source, vec3(") + directions[face] + "), 0.0)",
                              "samplerCube")[0][0] * 255, 40 * face, 1);

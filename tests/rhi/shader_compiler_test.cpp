@@ -126,8 +126,9 @@ TEST(ShaderCompiler, RefusesWhatCannotBe) {
     EXPECT_EQ(compiler.compile({.path = "/etc/secret.comp"}).error().code, ErrorCode::invalid_argument);
     EXPECT_EQ(compiler.compile({.path = "a.comp", .defines = {{"two words"}}, .text = "void main() {}"}).error().code,
               ErrorCode::invalid_argument);
-    EXPECT_EQ(compiler.compile({.path = "a.comp", .defines = {{"A", "1\n#error"}}, .text = "void main() {}"}).error().code,
-              ErrorCode::invalid_argument);
+    EXPECT_EQ(
+        compiler.compile({.path = "a.comp", .defines = {{"A", "1\n#error"}}, .text = "void main() {}"}).error().code,
+        ErrorCode::invalid_argument);
 }
 
 TEST(ShaderCompiler, DebugInformationHoldsFilesAndLines) {
@@ -161,7 +162,8 @@ TEST(ShaderCompiler, DebugInformationHoldsFilesAndLines) {
 
 TEST(ShaderCompiler, DebugInformationOfBlocksIsValid) {
     for (const bool debug_information : {false, true}) {
-        const auto shader = ShaderCompiler({.debug_information = debug_information}).compile({.path = "a.frag", .text = R"(
+        const auto shader =
+            ShaderCompiler({.debug_information = debug_information}).compile({.path = "a.frag", .text = R"(
             layout(location = 0) out vec4 color;
             void main() {
                 color = vec4(0);

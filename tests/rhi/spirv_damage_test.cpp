@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// SPIR-V that is broken in every way we could think of, and in thousands that nobody thought of: an error, never a crash.
+// SPIR-V that is broken in every way we could think of, and in thousands that nobody thought of: an error, never a
+// crash.
 #include "rhi/spirv.h"
 
 #include <gmock/gmock.h>
@@ -208,7 +209,8 @@ TEST(SpirvDamage, TypesThatWouldTakeAllTimeOrMemory) {
         %100 = OpTypeStruct %1 %1
 )";
     for (int i = 101; i < 140; ++i)
-        nested += "%" + std::to_string(i) + " = OpTypeStruct %" + std::to_string(i - 1) + " %" + std::to_string(i - 1) + "\n";
+        nested +=
+            "%" + std::to_string(i) + " = OpTypeStruct %" + std::to_string(i - 1) + " %" + std::to_string(i - 1) + "\n";
     EXPECT_THAT(message_of(assemble(nested)), HasSubstr("nested members"));
     EXPECT_THAT(message_of(assemble(R"(
         OpCapability Shader

@@ -12,7 +12,8 @@
 #include "rhi/format.h"
 
 /// @file
-/// What the bytes of a texel or of a vertex attribute mean, computed apart from any driver: the reference for format tests.
+/// What the bytes of a texel or of a vertex attribute mean, computed apart from any driver: the reference for format
+/// tests.
 
 namespace nacre::test {
 
@@ -95,7 +96,8 @@ inline TexelValue decode_texel(rhi::Format format, std::span<const std::byte> by
         const int bits = facts.block_bytes * 8 / facts.channels;
         for (std::size_t c = 0; c < facts.channels; ++c) {
             std::uint32_t raw = 0;
-            std::memcpy(&raw, bytes.data() + c * static_cast<std::size_t>(bits) / 8, static_cast<std::size_t>(bits) / 8);
+            std::memcpy(&raw, bytes.data() + c * static_cast<std::size_t>(bits) / 8,
+                        static_cast<std::size_t>(bits) / 8);
             const bool is_swapped = facts.name.starts_with("bgra") && c != 3;
             // The fourth channel counts as alpha even where a format has none of the others swapped.
             set_channel(value, is_swapped ? 2 - c : c, raw, bits, facts.kind);

@@ -24,10 +24,13 @@ class TextureTables : public BackendTest {
     /// A texture of noise with a full chain of mips (or as many as told).
     Texture noise(std::uint32_t width, std::uint32_t height, std::uint32_t seed, Format format = Format::rgba8_unorm,
                   std::uint32_t mips = 0) {
-        const TextureDesc desc{.format = format, .width = width, .height = height,
-                               .mips = mips ? mips : full_mip_count(width, height),
-                               .usage = TextureUsage::sampled | TextureUsage::copy_source | TextureUsage::copy_destination,
-                               .name = "noise " + std::to_string(seed)};
+        const TextureDesc desc{
+            .format = format,
+            .width = width,
+            .height = height,
+            .mips = mips ? mips : full_mip_count(width, height),
+            .usage = TextureUsage::sampled | TextureUsage::copy_source | TextureUsage::copy_destination,
+            .name = "noise " + std::to_string(seed)};
         const Texture texture = ok(device().create_texture(desc));
         std::mt19937 random(seed);
         for (std::uint32_t mip = 0; mip < desc.mips; ++mip) {
@@ -39,9 +42,13 @@ class TextureTables : public BackendTest {
     }
 
     Texture flat(std::uint32_t size, Texel color, Format format = Format::rgba8_unorm) {
-        const TextureDesc desc{.format = format, .width = size, .height = size, .mips = full_mip_count(size, size),
-                               .usage = TextureUsage::sampled | TextureUsage::copy_source | TextureUsage::copy_destination,
-                               .name = "flat"};
+        const TextureDesc desc{
+            .format = format,
+            .width = size,
+            .height = size,
+            .mips = full_mip_count(size, size),
+            .usage = TextureUsage::sampled | TextureUsage::copy_source | TextureUsage::copy_destination,
+            .name = "flat"};
         const Texture texture = ok(device().create_texture(desc));
         for (std::uint32_t mip = 0; mip < desc.mips; ++mip) {
             std::vector<Texel> texels(mip_bytes(desc, mip) / 4, color);
@@ -62,7 +69,8 @@ class TextureTables : public BackendTest {
     std::vector<std::array<float, 4>> shade(TextureTable& table, const std::string& expression,
                                             std::uint32_t index_count) {
         ShaderCompiler compiler({.embedded = {embedded_files()}});
-        const ShaderDesc text = ok(compiler.compile({.path = "table.frag", .defines = table.defines(), .text = R"(#version 460
+        const ShaderDesc text =
+            ok(compiler.compile({.path = "table.frag", .defines = table.defines(), .text = R"(#version 460
             #include "rhi/shaders/texture_table.glsl"
             layout(push_constant) uniform Parameters { uint index_count; } parameters;
             layout(location = 0) in vec2 uv;
@@ -89,7 +97,8 @@ class TextureTables : public BackendTest {
             layout(location = 0) out vec4 color;
 )";
         for (std::size_t i = 0; i < textures.size(); ++i)
-            body += "layout(set = 0, binding = " + std::to_string(i) + ") uniform sampler2D t" + std::to_string(i) + ";\n";
+            body +=
+                "layout(set = 0, binding = " + std::to_string(i) + ") uniform sampler2D t" + std::to_string(i) + ";\n";
         body += R"(void main() {
                 uvec2 pixel = uvec2(gl_FragCoord.xy);
                 uint index = (pixel.x + 3u * pixel.y) % parameters.index_count;
@@ -99,14 +108,16 @@ class TextureTables : public BackendTest {
         // Outside of any branch.
         for (std::size_t i = 0; i < textures.size(); ++i)
             body += "vec4 c" + std::to_string(i) + (explicit_gradients ? " = textureGrad(t" : " = texture(t") +
-                    std::to_string(i) + (explicit_gradients ? ", position, dFdx(position), dFdy(position));\n" : ", position);\n");
+                    std::to_string(i) +
+                    (explicit_gradients ? ", position, dFdx(position), dFdy(position));\n" : ", position);\n");
         for (std::size_t i = 0; i < textures.size(); ++i)
             body += "if (index == " + std::to_string(i) + "u) color = c" + std::to_string(i) + ";\n";
         return draw(compile(ShaderStage::fragment, body + "}"), static_cast<std::uint32_t>(textures.size()),
                     [&](CommandList& list, GraphicsPipeline pipeline) {
                         std::vector<BindGroupEntry> entries;
                         for (std::uint32_t i = 0; i < textures.size(); ++i)
-                            entries.push_back({.binding = i, .texture = textures[i].first, .sampler = textures[i].second});
+                            entries.push_back(
+                                {.binding = i, .texture = textures[i].first, .sampler = textures[i].second});
                         list.set_bind_group(0, ok(device().create_bind_group(
                                                    {.layout = ok(device().bind_group_layout(pipeline, 0)),
                                                     .entries = entries, .name = "direct"})));

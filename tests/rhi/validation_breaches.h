@@ -22,7 +22,8 @@ inline const char* const input_vertex = "layout(location = 0) in vec4 a; void ma
 
 /// Reads a texel buffer of integers without a format at binding 0, and writes one of r32ui at binding 1.
 inline const char* const texel_shader =
-    "layout(local_size_x = 1) in; layout(set = 0, binding = 0) uniform usamplerBuffer a; layout(set = 0, binding = 1, r32ui) "
+    "layout(local_size_x = 1) in; layout(set = 0, binding = 0) uniform usamplerBuffer a; layout(set = 0, binding = 1, "
+    "r32ui) "
     "uniform uimageBuffer b; void main() { imageStore(b, 0, texelFetch(a, 0)); }";
 
 /// One way to break a rule.

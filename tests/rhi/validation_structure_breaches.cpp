@@ -49,14 +49,16 @@ Built built(Bench& b) {
     const Built made{bottom(b), top(b)};
     CommandList list = b.list();
     list.build_acceleration_structure(made.below, std::array{source(b)});
-    list.build_acceleration_structure(made.above, std::array{AccelerationStructureInstance{.bottom_level = made.below}});
+    list.build_acceleration_structure(made.above,
+                                      std::array{AccelerationStructureInstance{.bottom_level = made.below}});
     (void)b.device().submit(std::move(list));
     return made;
 }
 void dispatch_with(Bench& b, AccelerationStructure structure, const std::function<void()>& before = {}) {
     const ComputePipeline p = b.compute(
         "#extension GL_EXT_ray_query : require\nlayout(local_size_x = 1) in; layout(set = 0, binding = 0) uniform "
-        "accelerationStructureEXT scene; void main() { rayQueryEXT query; rayQueryInitializeEXT(query, scene, 0, 255, vec3(0), "
+        "accelerationStructureEXT scene; void main() { rayQueryEXT query; rayQueryInitializeEXT(query, scene, 0, 255, "
+        "vec3(0), "
         "0, vec3(1), 1); rayQueryProceedEXT(query); }");
     const BindGroup group = b.group(p, {{.binding = 0, .acceleration_structure = structure}});
     if (before) before();
@@ -112,8 +114,8 @@ std::vector<Breach> structure_breaches() {
          }},
         {"N-313",
          [](Bench& b) {
-             (void)b.device().create_bind_group(
-                 {.layout = b.layout(BindingType::storage_buffer), .entries = {{.binding = 0, .acceleration_structure = top(b)}}});
+             (void)b.device().create_bind_group({.layout = b.layout(BindingType::storage_buffer),
+                                                 .entries = {{.binding = 0, .acceleration_structure = top(b)}}});
          }},
         {"N-580",
          [](Bench& b) {

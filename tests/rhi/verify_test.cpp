@@ -63,9 +63,10 @@ INSTANTIATE_TEST_SUITE_P(Rhi, Verify, ::testing::ValuesIn(available_variants()),
 
 TEST_P(Verify, TrueStatementsAreSilent) {
     Setup setup = set_up(true);
-    EXPECT_TRUE(run_stated(setup, {{.buffer = setup.input, .use = ResourceUse::storage_read},
-                                   {.buffer = setup.output, .use = ResourceUse::storage_read | ResourceUse::storage_write}})
-                    .empty());
+    EXPECT_TRUE(
+        run_stated(setup, {{.buffer = setup.input, .use = ResourceUse::storage_read},
+                           {.buffer = setup.output, .use = ResourceUse::storage_read | ResourceUse::storage_write}})
+            .empty());
 }
 
 TEST_P(Verify, AMissingAccessIsReported) {

@@ -21,7 +21,8 @@ using testing::Not;
 TEST(CommandLineTest, HelpTeaches) {
     const CommandResult help = run_nacre({"--help"});
     EXPECT_EQ(help.exit_code, 0);
-    for (const char* command : {"devices", "render", "compare", "diff", "explain", "material", "demo", "cache", "completion"}) {
+    for (const char* command :
+         {"devices", "render", "compare", "diff", "explain", "material", "demo", "cache", "completion"}) {
         EXPECT_THAT(help.output, HasSubstr(command));
         const CommandResult own = run_nacre({command, "--help"});
         EXPECT_EQ(own.exit_code, 0);
@@ -77,8 +78,8 @@ INSTANTIATE_TEST_SUITE_P(
         WrongLine{render({"--profile", "huge"}), "'huge' is not one of: mobile"},
         WrongLine{render({"--restrict", "wii"}), "gles31-minimum"},
         WrongLine{render({"--tone-mapping", "pretty"}), "'pretty' is not one of: filmic, linear"},
-        WrongLine{render({"--camera", "nobody"}), "'nobody'"}, WrongLine{render({"--dump-graph", "a.txt"}), ".svg or .dot"},
-        WrongLine{render({"--json"}), "--json"},
+        WrongLine{render({"--camera", "nobody"}), "'nobody'"},
+        WrongLine{render({"--dump-graph", "a.txt"}), ".svg or .dot"}, WrongLine{render({"--json"}), "--json"},
         WrongLine{{"render", "builtin:nothing", "-o", "a.png"}, "builtin:spheres"},
         WrongLine{{"compare", "builtin:spheres"}, "--backends is required"},
         WrongLine{{"compare", "builtin:spheres", "--backends", "gl"}, "two or more"},

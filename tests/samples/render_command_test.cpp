@@ -159,8 +159,8 @@ TEST_F(RenderCommandTest, MissingDriversAreNamedAndTheOthersGoOn) {
 TEST_F(RenderCommandTest, PictureAndJsonOnEveryBackend) {
     for (const std::string& backend : backends()) {
         SCOPED_TRACE(backend);
-        const CommandResult result = nacre({"render", "builtin:spheres", "-o", file("a.png"), "--backend", backend, "--size",
-                                            "192x108", "--frames", "2", "--json", file("a.json")});
+        const CommandResult result = nacre({"render", "builtin:spheres", "-o", file("a.png"), "--backend", backend,
+                                            "--size", "192x108", "--frames", "2", "--json", file("a.json")});
         ASSERT_EQ(result.exit_code, 0) << result.errors;
         const auto picture = read_image_bytes(file("a.png"));
         ASSERT_TRUE(picture) << picture.error().message();
@@ -183,8 +183,9 @@ TEST_F(RenderCommandTest, PictureAndJsonOnEveryBackend) {
 
 TEST_F(RenderCommandTest, ExposureIsInStops) {
     const auto render = [&](const char* exposure) {
-        const CommandResult result = nacre({"render", "builtin:spheres", "-o", file("a.png"), "--size", "96x54",
-                                            "--exposure", exposure, "--tone-mapping", "linear", "--json", file("a.json")});
+        const CommandResult result =
+            nacre({"render", "builtin:spheres", "-o", file("a.png"), "--size", "96x54", "--exposure", exposure,
+                   "--tone-mapping", "linear", "--json", file("a.json")});
         EXPECT_EQ(result.exit_code, 0) << result.errors;
         return read_json(file("a.json"))["median_luminance"].get<double>();
     };
@@ -310,14 +311,16 @@ TEST_F(RenderCommandTest, BackendsAgreeWithEachOther) {
         nacre({"compare", "builtin:spheres", "--backends", list, "--size", "320x180", "-o", file("page")});
     EXPECT_EQ(result.exit_code, 0) << result.output << result.errors;
     EXPECT_TRUE(std::filesystem::exists(file("page/index.html")));
-    for (const std::string& backend : backends()) EXPECT_TRUE(std::filesystem::exists(file("page/" + backend + ".png")));
+    for (const std::string& backend : backends())
+        EXPECT_TRUE(std::filesystem::exists(file("page/" + backend + ".png")));
 }
 
 TEST_F(RenderCommandTest, ToleranceDecidesTheExitCode) {
     if (backends().size() < 2) GTEST_SKIP() << "only one backend works here";
     std::ofstream(file("impossible.json")) << R"({"final": {"psnr_db": 201}})";
-    const CommandResult result = nacre({"compare", "builtin:triangle", "--backends", backends()[0] + "," + backends()[1],
-                                        "--size", "64x64", "--tolerance", file("impossible.json")});
+    const CommandResult result =
+        nacre({"compare", "builtin:triangle", "--backends", backends()[0] + "," + backends()[1], "--size", "64x64",
+               "--tolerance", file("impossible.json")});
     EXPECT_EQ(result.exit_code, 3) << result.output << result.errors;
     EXPECT_THAT(result.output, HasSubstr("over the tolerance"));
 }

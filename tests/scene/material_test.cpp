@@ -266,7 +266,8 @@ TEST(Material, VolumesGrowWithTheirNodes) {
     file.primitive()["material"] = 0;
     file.json["meshes"].push_back(file.json["meshes"][0]);
     file.json["meshes"][1]["primitives"][0]["material"] = 1;
-    file.json["nodes"] = nlohmann::json::parse(R"([{"mesh": 0}, {"mesh": 0, "scale": [2, 2, 2]}, {"mesh": 0, "scale": [-2, 2, 2]},
+    file.json["nodes"] =
+        nlohmann::json::parse(R"([{"mesh": 0}, {"mesh": 0, "scale": [2, 2, 2]}, {"mesh": 0, "scale": [-2, 2, 2]},
         {"mesh": 0, "scale": [1, 3, 9]}, {"mesh": 1, "scale": [5, 5, 5]}])");
     file.json["scenes"][0]["nodes"] = {0, 1, 2, 3, 4};
     const auto scene = file.load();

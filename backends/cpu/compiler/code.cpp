@@ -52,9 +52,11 @@ std::string text_of(llvm::Error error) { return llvm::toString(std::move(error))
 
 class OrcCode final : public LoadedCode {
   public:
-    OrcCode(std::shared_ptr<llvm::orc::LLJIT> jit, llvm::orc::JITDylib& library) : jit_(std::move(jit)), library_(library) {}
+    OrcCode(std::shared_ptr<llvm::orc::LLJIT> jit, llvm::orc::JITDylib& library)
+        : jit_(std::move(jit)), library_(library) {}
     ~OrcCode() override {
-        if (llvm::Error error = jit_->getExecutionSession().removeJITDylib(library_)) llvm::consumeError(std::move(error));
+        if (llvm::Error error = jit_->getExecutionSession().removeJITDylib(library_))
+            llvm::consumeError(std::move(error));
     }
     void* find(const char* symbol) override {
         auto address = jit_->lookup(library_, symbol);
@@ -127,7 +129,8 @@ class OrcGenerator final : public CodeGenerator {
         if (llvm::verifyModule(module, &problem_stream))
             return std::unexpected(failed(name, "the code made is not valid: " + problems));
         optimize(module, *machine, has_coroutines);
-        // Translation with less care takes time in proportion, where blocks are not long; the usual one does so in blocks up to some length.
+        // Translation with less care takes time in proportion, where blocks are not long; the usual one does so in
+        // blocks up to some length.
         if (!is_huge && largest_block(module) > most_in_block) {
             is_huge = true;
             machine = make_machine(llvm::CodeGenOptLevel::None);
@@ -142,7 +145,8 @@ class OrcGenerator final : public CodeGenerator {
         module.getContext().setDiagnosticHandlerCallBack(
             [](const llvm::DiagnosticInfo* what, void* to) {
                 auto& all = *static_cast<decltype(told)*>(to);
-                if (const auto* frame = llvm::dyn_cast<llvm::DiagnosticInfoStackSize>(what)) all.stack_bytes += frame->getStackSize();
+                if (const auto* frame = llvm::dyn_cast<llvm::DiagnosticInfoStackSize>(what))
+                    all.stack_bytes += frame->getStackSize();
                 all.has_error = all.has_error || what->getSeverity() == llvm::DS_Error;
             },
             &told);
@@ -161,10 +165,13 @@ class OrcGenerator final : public CodeGenerator {
         auto library = jit_->createJITDylib(fmt::format("shader{}", counter_.fetch_add(1)));
         if (!library) return std::unexpected(failed(name, text_of(library.takeError())));
         auto code = std::make_shared<OrcCode>(jit_, *library);
-        if (llvm::Error error = define_symbols(*library)) return std::unexpected(failed(name, text_of(std::move(error))));
-        llvm::SmallVector<char, 0> bytes(reinterpret_cast<const char*>(object.data()), reinterpret_cast<const char*>(object.data()) + object.size());
+        if (llvm::Error error = define_symbols(*library))
+            return std::unexpected(failed(name, text_of(std::move(error))));
+        llvm::SmallVector<char, 0> bytes(reinterpret_cast<const char*>(object.data()),
+                                         reinterpret_cast<const char*>(object.data()) + object.size());
         auto buffer = std::make_unique<llvm::SmallVectorMemoryBuffer>(std::move(bytes), name, false);
-        if (llvm::Error error = jit_->addObjectFile(*library, std::move(buffer))) return std::unexpected(failed(name, text_of(std::move(error))));
+        if (llvm::Error error = jit_->addObjectFile(*library, std::move(buffer)))
+            return std::unexpected(failed(name, text_of(std::move(error))));
         return code;
     }
 
@@ -201,7 +208,9 @@ class OrcGenerator final : public CodeGenerator {
                 for (llvm::Instruction& at : block)
                     if (llvm::isa<llvm::AllocaInst>(at)) last_variable = &at;
                 if (last_variable)
-                    std::erase_if(begins, [&](const llvm::Instruction* at) { return at->getParent() == &block && at->comesBefore(last_variable); });
+                    std::erase_if(begins, [&](const llvm::Instruction* at) {
+                        return at->getParent() == &block && at->comesBefore(last_variable);
+                    });
             }
         // From the back, so that each moves only what is behind it.
         for (auto at = begins.rbegin(); at != begins.rend(); ++at) (*at)->getParent()->splitBasicBlock(*at);
@@ -213,8 +222,8 @@ class OrcGenerator final : public CodeGenerator {
         if (!target) return nullptr;
         llvm::TargetOptions options;
         options.AllowFPOpFusion = math_options_.contract ? llvm::FPOpFusion::Standard : llvm::FPOpFusion::Strict;
-        return std::unique_ptr<llvm::TargetMachine>(target->createTargetMachine(triple_, cpu_, features_, options, llvm::Reloc::PIC_, llvm::CodeModel::Small,
-                                                                                level, true));
+        return std::unique_ptr<llvm::TargetMachine>(target->createTargetMachine(
+            triple_, cpu_, features_, options, llvm::Reloc::PIC_, llvm::CodeModel::Small, level, true));
     }
 
     /// The lean list of passes of the design: twice as fast to compile as O2, and code that runs as fast.
@@ -257,20 +266,24 @@ class OrcGenerator final : public CodeGenerator {
         spread_conditions(module);
     }
 
-    /// Makes a condition for all lanes a splat where it is a choice between all and none: instruction selection of LLVM 19 goes
-    /// round for ever over two such choices of 8 lanes that are joined, where masks have registers of their own (AVX-512).
+    /// Makes a condition for all lanes a splat where it is a choice between all and none: instruction selection of LLVM
+    /// 19 goes round for ever over two such choices of 8 lanes that are joined, where masks have registers of their own
+    /// (AVX-512).
     static void spread_conditions(llvm::Module& module) {
         for (llvm::Function& function : module)
             for (llvm::BasicBlock& block : function)
                 for (llvm::Instruction& at : llvm::make_early_inc_range(block)) {
                     auto* choice = llvm::dyn_cast<llvm::SelectInst>(&at);
                     const auto* type = choice ? llvm::dyn_cast<llvm::FixedVectorType>(choice->getType()) : nullptr;
-                    if (!type || !type->getElementType()->isIntegerTy(1) || !choice->getCondition()->getType()->isIntegerTy(1)) continue;
+                    if (!type || !type->getElementType()->isIntegerTy(1) ||
+                        !choice->getCondition()->getType()->isIntegerTy(1))
+                        continue;
                     const auto* yes = llvm::dyn_cast<llvm::Constant>(choice->getTrueValue());
                     const auto* no = llvm::dyn_cast<llvm::Constant>(choice->getFalseValue());
                     if (!yes || !no || !yes->isAllOnesValue() || !no->isNullValue()) continue;
                     llvm::IRBuilder<> builder(choice);
-                    choice->replaceAllUsesWith(builder.CreateVectorSplat(type->getNumElements(), choice->getCondition()));
+                    choice->replaceAllUsesWith(
+                        builder.CreateVectorSplat(type->getNumElements(), choice->getCondition()));
                     choice->eraseFromParent();
                 }
     }
@@ -278,7 +291,8 @@ class OrcGenerator final : public CodeGenerator {
     llvm::Error define_symbols(llvm::orc::JITDylib& library) {
         llvm::orc::SymbolMap symbols;
         const auto define = [&](const char* symbol, auto* function) {
-            symbols[jit_->mangleAndIntern(symbol)] = {llvm::orc::ExecutorAddr::fromPtr(function), llvm::JITSymbolFlags::Exported | llvm::JITSymbolFlags::Callable};
+            symbols[jit_->mangleAndIntern(symbol)] = {llvm::orc::ExecutorAddr::fromPtr(function),
+                                                      llvm::JITSymbolFlags::Exported | llvm::JITSymbolFlags::Callable};
         };
         define("nacre_cpu_image", image_function(lanes_));
         define("nacre_cpu_texel", texel_function());
@@ -299,11 +313,18 @@ class OrcGenerator final : public CodeGenerator {
         // What LLVM and the functions in double precision call.
         using One = double (*)(double);
         using Two = double (*)(double, double);
-        const std::pair<const char*, One> one_argument[] = {
-            {"sin", std::sin}, {"cos", std::cos}, {"tan", std::tan}, {"asin", std::asin}, {"acos", std::acos}, {"atan", std::atan},
-            {"sinh", std::sinh}, {"cosh", std::cosh}, {"tanh", std::tanh}, {"asinh", std::asinh}, {"acosh", std::acosh}, {"atanh", std::atanh},
-            {"exp", std::exp}, {"exp2", std::exp2}, {"log", std::log}, {"log2", std::log2}, {"floor", std::floor}, {"ceil", std::ceil},
-            {"trunc", std::trunc}, {"rint", std::rint}, {"roundeven", std::rint}, {"nearbyint", std::nearbyint}, {"round", std::round}, {"sqrt", std::sqrt}};
+        const std::pair<const char*, One> one_argument[] = {{"sin", std::sin},        {"cos", std::cos},
+                                                            {"tan", std::tan},        {"asin", std::asin},
+                                                            {"acos", std::acos},      {"atan", std::atan},
+                                                            {"sinh", std::sinh},      {"cosh", std::cosh},
+                                                            {"tanh", std::tanh},      {"asinh", std::asinh},
+                                                            {"acosh", std::acosh},    {"atanh", std::atanh},
+                                                            {"exp", std::exp},        {"exp2", std::exp2},
+                                                            {"log", std::log},        {"log2", std::log2},
+                                                            {"floor", std::floor},    {"ceil", std::ceil},
+                                                            {"trunc", std::trunc},    {"rint", std::rint},
+                                                            {"roundeven", std::rint}, {"nearbyint", std::nearbyint},
+                                                            {"round", std::round},    {"sqrt", std::sqrt}};
         for (const auto& [symbol, function] : one_argument) define(symbol, function);
         const std::pair<const char*, Two> two_arguments[] = {
             {"atan2", std::atan2}, {"pow", std::pow}, {"fmod", std::fmod}, {"fmin", std::fmin}, {"fmax", std::fmax}};

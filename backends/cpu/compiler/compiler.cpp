@@ -123,7 +123,8 @@ class ShaderCompilation final : public Compiler {
 
     /// A program of one stage of drawing with what `compile` gave for it.
     template <typename Program>
-    Expected<Program> with_entry(Program program, std::shared_ptr<CompiledCode> code, const ShaderSource& source) const {
+    Expected<Program> with_entry(Program program, std::shared_ptr<CompiledCode> code,
+                                 const ShaderSource& source) const {
         program.in_double = all_.options.mode == ExecutionMode::double_precision;
         program.name = std::string(source.name);
         if (!code) return program;
@@ -163,7 +164,8 @@ class ShaderCompilation final : public Compiler {
                                                     spv::ExecutionModel model, const VertexInput& input, Facts& facts,
                                                     Emit&& emit, std::uint64_t* too_large_stack = nullptr) {
         // Code that is traced refers to addresses of this process; only what is translated can be written out.
-        const bool is_kept = how.options.use_disk_cache && !source.trace && !how.options.only_translates && cache_.is_on();
+        const bool is_kept =
+            how.options.use_disk_cache && !source.trace && !how.options.only_translates && cache_.is_on();
         const Hash128 key = is_kept ? key_of(how, source, model, input) : Hash128{};
         StoredCode code;
         const auto is_known = [&] {
@@ -178,11 +180,12 @@ class ShaderCompilation final : public Compiler {
         }
         if (code.stack_bytes > most_stack_bytes) {
             if (too_large_stack) *too_large_stack = code.stack_bytes;
-            return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", source.name),
-                        fmt::format("its values take {} bytes of stack with {} lanes; {} are the most", code.stack_bytes,
-                                    how.options.lanes, most_stack_bytes),
-                        fmt::format("Load parts of arrays and structures instead of whole ones{}.",
-                                    how.options.lanes > min_lanes ? ", or choose fewer lanes (as in 'cpu:lanes=4')" : ""));
+            return fail(
+                ErrorCode::unsupported, "compile shader", fmt::format("'{}'", source.name),
+                fmt::format("its values take {} bytes of stack with {} lanes; {} are the most", code.stack_bytes,
+                            how.options.lanes, most_stack_bytes),
+                fmt::format("Load parts of arrays and structures instead of whole ones{}.",
+                            how.options.lanes > min_lanes ? ", or choose fewer lanes (as in 'cpu:lanes=4')" : ""));
         }
         NACRE_TRY(std::shared_ptr<LoadedCode> loaded,
                   how.generator->load(std::move(code.object), std::string(source.name)));
@@ -193,9 +196,10 @@ class ShaderCompilation final : public Compiler {
     template <typename Facts, typename Emit>
     Expected<StoredCode> translate(const Variant& how, const ShaderSource& source, spv::ExecutionModel model,
                                    Facts& facts, Emit& emit) {
-        NACRE_TRY(const std::vector<std::uint32_t> words, legalize(source.spirv, source.specialization, source.name,
-                                                                    {.keeps_variables = (how.options.checks & check_sanitize) != 0,
-                                                                     .inlines_all = how.options.checks != 0 || source.trace}));
+        NACRE_TRY(const std::vector<std::uint32_t> words,
+                  legalize(source.spirv, source.specialization, source.name,
+                           {.keeps_variables = (how.options.checks & check_sanitize) != 0,
+                            .inlines_all = how.options.checks != 0 || source.trace}));
         NACRE_TRY(const Module module, Module::parse(words, source.entry_point, model, source.name));
         llvm::LLVMContext context;
         auto target = std::make_unique<llvm::Module>("shader", context);
@@ -210,7 +214,8 @@ class ShaderCompilation final : public Compiler {
                         "Write it another way for the CPU backend, or use another backend.");
         } catch (const std::out_of_range&) {
             return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", source.name),
-                        "the module refers to something in a way that the CPU backend does not know", "Use another backend.");
+                        "the module refers to something in a way that the CPU backend does not know",
+                        "Use another backend.");
         }
         for (const auto& [offset, operation] : emitted.narrowed)
             facts.narrowed.push_back({rhi::spirv::source_line(words, offset), operation});
@@ -229,8 +234,8 @@ class ShaderCompilation final : public Compiler {
         }
         if (how.options.only_translates) {
             if (llvm::verifyModule(*target))
-                return fail(ErrorCode::internal, "compile shader", fmt::format("'{}'", source.name), "its LLVM module is not valid",
-                            "Use another backend.");
+                return fail(ErrorCode::internal, "compile shader", fmt::format("'{}'", source.name),
+                            "its LLVM module is not valid", "Use another backend.");
             return StoredCode{};
         }
         NACRE_TRY(CodeGenerator::Object made,
@@ -246,8 +251,8 @@ class ShaderCompilation final : public Compiler {
                           const VertexInput& input) {
         std::string text = fmt::format("{} {} {} {} {} {} {} {} {}\n", nacre_cpu_compiler_sources, how.options.lanes,
                                        static_cast<int>(how.options.mode), how.options.checks, static_cast<int>(model),
-                                       source.entry_point, how.generator->fingerprint(), spvSoftwareVersionDetailsString(),
-                                       source.spirv.size());
+                                       source.entry_point, how.generator->fingerprint(),
+                                       spvSoftwareVersionDetailsString(), source.spirv.size());
         for (const rhi::SpecializationConstant& constant : source.specialization)
             text += std::visit(
                 [&](auto value) {
@@ -258,10 +263,12 @@ class ShaderCompilation final : public Compiler {
                     return fmt::format("c{} {}\n", constant.id, bits);
                 },
                 constant.value);
-        for (const BindingSlots& slot : source.slots) text += fmt::format("s{} {} {} {}\n", slot.set, slot.binding, slot.first, slot.count);
+        for (const BindingSlots& slot : source.slots)
+            text += fmt::format("s{} {} {} {}\n", slot.set, slot.binding, slot.first, slot.count);
         for (const rhi::VertexAttribute& at : input.attributes)
             text += fmt::format("a{} {} {} {}\n", at.location, at.buffer, at.offset, static_cast<int>(at.format));
-        for (const rhi::VertexBufferLayout& at : input.buffers) text += fmt::format("b{} {}\n", at.stride, at.per_instance);
+        for (const rhi::VertexBufferLayout& at : input.buffers)
+            text += fmt::format("b{} {}\n", at.stride, at.per_instance);
         text.append(reinterpret_cast<const char*>(source.spirv.data()), source.spirv.size() * 4);
         return hash128(std::as_bytes(std::span(text)));
     }
@@ -276,7 +283,8 @@ class ShaderCompilation final : public Compiler {
 
 Expected<std::unique_ptr<Compiler>> Compiler::create(const CompilerOptions& options) {
     if (options.lanes != 4 && options.lanes != 8 && options.lanes != 16)
-        return fail(ErrorCode::invalid_argument, "make CPU compiler", fmt::format("lanes={}", options.lanes), "lanes are 4, 8 or 16", "Choose one of them.");
+        return fail(ErrorCode::invalid_argument, "make CPU compiler", fmt::format("lanes={}", options.lanes),
+                    "lanes are 4, 8 or 16", "Choose one of them.");
     const bool is_fast = options.mode == ExecutionMode::fast;
     ShaderCompilation::Variant all{options, nullptr}, subgroups{options, nullptr};
     NACRE_TRY(all.generator, CodeGenerator::create(options.lanes, is_fast));

@@ -34,7 +34,8 @@ struct CompilerOptions {
     ExecutionMode mode = ExecutionMode::fast;
     bool use_disk_cache = true;
     std::uint32_t checks = 0;  ///< CheckFlags: faults that the code looks for while it runs.
-    /// Shaders end as LLVM modules that were verified, which is a tenth of the work: programs have no code and cannot run.
+    /// Shaders end as LLVM modules that were verified, which is a tenth of the work: programs have no code and cannot
+    /// run.
     bool only_translates = false;
 };
 

@@ -21,7 +21,8 @@ bool ComputeEmitter::emit_stage(const Instruction& at) {
             if (options.checks) check_barrier();
             if (!has_barriers || !waits_for_workgroup(at)) return true;
             // All subgroups of the workgroup come to this point before the first of them goes on.
-            llvm::Value* state = builder.CreateIntrinsic(llvm::Intrinsic::coro_suspend, {}, {llvm::ConstantTokenNone::get(context), builder.getFalse()});
+            llvm::Value* state = builder.CreateIntrinsic(llvm::Intrinsic::coro_suspend, {},
+                                                         {llvm::ConstantTokenNone::get(context), builder.getFalse()});
             llvm::BasicBlock* resumed = llvm::BasicBlock::Create(context, "resumed", function_);
             llvm::SwitchInst* next = builder.CreateSwitch(state, suspend_block, 2);
             next->addCase(builder.getInt8(0), resumed);
@@ -29,7 +30,12 @@ bool ComputeEmitter::emit_stage(const Instruction& at) {
             builder.SetInsertPoint(resumed);
             return true;
         }
-        case Op::OpDPdx: case Op::OpDPdy: case Op::OpFwidth: case Op::OpDPdxFine: case Op::OpDPdyFine: case Op::OpFwidthFine:
+        case Op::OpDPdx:
+        case Op::OpDPdy:
+        case Op::OpFwidth:
+        case Op::OpDPdxFine:
+        case Op::OpDPdyFine:
+        case Op::OpFwidthFine:
         case Op::OpDPdxCoarse: case Op::OpDPdyCoarse: case Op::OpFwidthCoarse:
             reject("derivatives in a compute shader are not supported");
         default: return false;
@@ -43,13 +49,16 @@ std::vector<Component> ComputeEmitter::input_components(const Variable& variable
         return invariant_load(builder.getInt32Ty(), at_offset(range, static_cast<std::int64_t>(offset)), 4);
     };
     const std::array<std::uint32_t, 3>& size = module.workgroup_size;
-    const std::array<llvm::Value*, 3> group{group_x, range_word(offsetof(WorkgroupRange, y)), range_word(offsetof(WorkgroupRange, z))};
+    const std::array<llvm::Value*, 3> group{group_x, range_word(offsetof(WorkgroupRange, y)),
+                                            range_word(offsetof(WorkgroupRange, z))};
     switch (*variable.builtin) {
         case BuiltIn::WorkgroupId: return {Component(group[0]), Component(group[1]), Component(group[2])};
         case BuiltIn::NumWorkgroups:
-            return {Component(range_word(offsetof(WorkgroupRange, count))), Component(range_word(offsetof(WorkgroupRange, count) + 4)),
+            return {Component(range_word(offsetof(WorkgroupRange, count))),
+                    Component(range_word(offsetof(WorkgroupRange, count) + 4)),
                     Component(range_word(offsetof(WorkgroupRange, count) + 8))};
-        case BuiltIn::WorkgroupSize: return {Component(int32(size[0])), Component(int32(size[1])), Component(int32(size[2]))};
+        case BuiltIn::WorkgroupSize:
+            return {Component(int32(size[0])), Component(int32(size[1])), Component(int32(size[2]))};
         case BuiltIn::LocalInvocationId: return {local_id[0], local_id[1], local_id[2]};
         case BuiltIn::GlobalInvocationId: {
             std::vector<Component> made;
@@ -61,7 +70,9 @@ std::vector<Component> ComputeEmitter::input_components(const Variable& variable
         case BuiltIn::NumSubgroups: return {Component(int32(subgroups))};
         case BuiltIn::SubgroupId: return {Component(subgroup_index)};
         case BuiltIn::DeviceIndex: return {Component(int32(0))};
-        default: reject(fmt::format("built-in input {} is not supported in compute shaders", static_cast<unsigned>(*variable.builtin)));
+        default:
+            reject(fmt::format("built-in input {} is not supported in compute shaders",
+                               static_cast<unsigned>(*variable.builtin)));
     }
 }
 
@@ -79,7 +90,9 @@ void ComputeEmitter::emit_subgroup_body(llvm::Value* subgroup) {
         local_id[1] = builder.CreateURem(row, int32(size[1]));
         local_id[2] = builder.CreateUDiv(row, int32(size[1]));
     } else {
-        const auto split = [&](llvm::Value* value, std::uint32_t by) { return llvm::ConstantInt::get(value->getType(), by); };
+        const auto split = [&](llvm::Value* value, std::uint32_t by) {
+            return llvm::ConstantInt::get(value->getType(), by);
+        };
         local_id[0] = builder.CreateURem(index.value, split(index.value, size[0]));
         llvm::Value* row = builder.CreateUDiv(index.value, split(index.value, size[0]));
         local_id[1] = size[1] == 1 ? Component(int32(0)) : Component(builder.CreateURem(row, split(row, size[1])));
@@ -173,7 +186,8 @@ void ComputeEmitter::emit_plain_kernel() {
 /// and the kernel runs all of them from barrier to barrier. With null for the memory only the size is told.
 void ComputeEmitter::emit_suspending_kernel() {
     llvm::Type* word = builder.getInt32Ty();
-    auto* type = llvm::FunctionType::get(pointer_type, {pointer_type, pointer_type, word, word, pointer_type, pointer_type}, false);
+    auto* type = llvm::FunctionType::get(pointer_type,
+                                         {pointer_type, pointer_type, word, word, pointer_type, pointer_type}, false);
     llvm::Function* coroutine = llvm::Function::Create(type, llvm::Function::InternalLinkage, "subgroup", target);
     coroutine->setPresplitCoroutine();
     function_ = coroutine;
@@ -200,7 +214,8 @@ void ComputeEmitter::emit_suspending_kernel() {
     memory = invariant_load(pointer_type, at_offset(range, offsetof(WorkgroupRange, memory)), 8);
     emit_subgroup_body(coroutine->getArg(3));
     // The last stop, from which nothing is resumed.
-    llvm::Value* state = builder.CreateIntrinsic(llvm::Intrinsic::coro_suspend, {}, {llvm::ConstantTokenNone::get(context), builder.getTrue()});
+    llvm::Value* state = builder.CreateIntrinsic(llvm::Intrinsic::coro_suspend, {},
+                                                 {llvm::ConstantTokenNone::get(context), builder.getTrue()});
     llvm::BasicBlock* never = llvm::BasicBlock::Create(context, "never", coroutine);
     llvm::SwitchInst* last = builder.CreateSwitch(state, suspend_block, 2);
     last->addCase(builder.getInt8(0), never);
@@ -212,21 +227,24 @@ void ComputeEmitter::emit_suspending_kernel() {
     builder.CreateIntrinsic(llvm::Intrinsic::coro_free, {}, {id, handle});
     builder.CreateBr(suspend_block);
     builder.SetInsertPoint(suspend_block);
-    builder.CreateIntrinsic(llvm::Intrinsic::coro_end, {}, {handle, builder.getFalse(), llvm::ConstantTokenNone::get(context)});
+    builder.CreateIntrinsic(llvm::Intrinsic::coro_end, {},
+                            {handle, builder.getFalse(), llvm::ConstantTokenNone::get(context)});
     builder.CreateRet(handle);
     builder.SetInsertPoint(slot_block);
     builder.CreateBr(start);
 
     // void frame_size(ptr result)
-    llvm::Function* frame_size = llvm::Function::Create(llvm::FunctionType::get(builder.getVoidTy(), {pointer_type}, false),
-                                                        llvm::Function::ExternalLinkage, "frame_size", target);
+    llvm::Function* frame_size =
+        llvm::Function::Create(llvm::FunctionType::get(builder.getVoidTy(), {pointer_type}, false),
+                               llvm::Function::ExternalLinkage, "frame_size", target);
     builder.SetInsertPoint(llvm::BasicBlock::Create(context, "start", frame_size));
     builder.CreateCall(coroutine, {null, null, int32(0), int32(0), null, frame_size->getArg(0)});
     builder.CreateRetVoid();
 
     // void kernel(context, range): frames lie behind the workgroup's variables, each at a multiple of 64 bytes.
-    llvm::Function* kernel = llvm::Function::Create(llvm::FunctionType::get(builder.getVoidTy(), {pointer_type, pointer_type}, false),
-                                                    llvm::Function::ExternalLinkage, "kernel", target);
+    llvm::Function* kernel =
+        llvm::Function::Create(llvm::FunctionType::get(builder.getVoidTy(), {pointer_type, pointer_type}, false),
+                               llvm::Function::ExternalLinkage, "kernel", target);
     llvm::BasicBlock* entry = llvm::BasicBlock::Create(context, "entry", kernel);
     llvm::BasicBlock* group_loop = llvm::BasicBlock::Create(context, "workgroup", kernel);
     llvm::BasicBlock* launch = llvm::BasicBlock::Create(context, "launch", kernel);
@@ -242,9 +260,11 @@ void ComputeEmitter::emit_suspending_kernel() {
     llvm::AllocaInst* frame_bytes = builder.CreateAlloca(builder.getInt64Ty());
     llvm::AllocaInst* handles = builder.CreateAlloca(llvm::ArrayType::get(pointer_type, subgroups));
     builder.CreateCall(frame_size, {frame_bytes});
-    llvm::Value* stride = builder.CreateAnd(builder.CreateAdd(builder.CreateLoad(builder.getInt64Ty(), frame_bytes), int64(63)), int64(~63ll));
-    llvm::Value* frames = at_offset(builder.CreateLoad(pointer_type, at_offset(kernel_range, offsetof(WorkgroupRange, memory))),
-                                    static_cast<std::int64_t>((workgroup_variable_bytes + 63) / 64 * 64));
+    llvm::Value* stride = builder.CreateAnd(
+        builder.CreateAdd(builder.CreateLoad(builder.getInt64Ty(), frame_bytes), int64(63)), int64(~63ll));
+    llvm::Value* frames =
+        at_offset(builder.CreateLoad(pointer_type, at_offset(kernel_range, offsetof(WorkgroupRange, memory))),
+                  static_cast<std::int64_t>((workgroup_variable_bytes + 63) / 64 * 64));
     llvm::Value* x_begin = builder.CreateLoad(word, at_offset(kernel_range, offsetof(WorkgroupRange, x_begin)));
     llvm::Value* x_end = builder.CreateLoad(word, at_offset(kernel_range, offsetof(WorkgroupRange, x_end)));
     builder.CreateCondBr(builder.CreateICmpULT(x_begin, x_end), group_loop, done);
@@ -273,7 +293,8 @@ void ComputeEmitter::emit_suspending_kernel() {
     llvm::PHINode* running = builder.CreatePHI(builder.getInt1Ty(), 2);
     which->addIncoming(int32(0), round);
     running->addIncoming(builder.getFalse(), round);
-    llvm::Value* one = builder.CreateLoad(pointer_type, builder.CreateGEP(pointer_type, handles, builder.CreateZExt(which, builder.getInt64Ty())));
+    llvm::Value* one = builder.CreateLoad(
+        pointer_type, builder.CreateGEP(pointer_type, handles, builder.CreateZExt(which, builder.getInt64Ty())));
     llvm::Value* is_done = builder.CreateIntrinsic(llvm::Intrinsic::coro_done, {}, {one});
     builder.CreateCondBr(is_done, resume_next, resume_one);
     builder.SetInsertPoint(resume_one);
@@ -300,11 +321,13 @@ void ComputeEmitter::emit_suspending_kernel() {
 void ComputeEmitter::emit() {
     const auto& size = module.workgroup_size;
     const std::uint64_t total = std::uint64_t{size[0]} * size[1] * size[2];
-    if (total == 0 || total > 4096) reject("a workgroup has " + std::to_string(total) + " invocations; 1 to 4096 are possible");
+    if (total == 0 || total > 4096)
+        reject("a workgroup has " + std::to_string(total) + " invocations; 1 to 4096 are possible");
     subgroups = static_cast<std::uint32_t>((total + lanes - 1) / lanes);
     for (const auto& [id, function] : module.functions())
         for (const Block& block : function.blocks)
-            for (const Instruction& at : block.body) has_barriers = has_barriers || (at.op == Op::OpControlBarrier && waits_for_workgroup(at));
+            for (const Instruction& at : block.body)
+                has_barriers = has_barriers || (at.op == Op::OpControlBarrier && waits_for_workgroup(at));
     has_barriers = has_barriers && subgroups > 1;
     if (has_barriers) emit_suspending_kernel();
     else emit_plain_kernel();

@@ -74,7 +74,8 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
         const Value x = get(operands[0]), y = get(operands[1]);
         std::vector<Component> made;
         for (std::size_t i = 0; i < x.components.size(); ++i)
-            made.push_back(apply({x.components[i], y.components.at(i)}, [&](Values v) { return function(v[0], v[1]); }));
+            made.push_back(
+                apply({x.components[i], y.components.at(i)}, [&](Values v) { return function(v[0], v[1]); }));
         return made;
     };
     const auto scalar_of = [&](Id id) -> const Type& { return module.type(component_type(id, 0)); };
@@ -96,7 +97,9 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
             std::vector<Component> made;
             for (std::size_t i = 0; i < x.components.size(); ++i) {
                 if (scalar_of(type_id).bits == 32) made.push_back(add(x.components[i], y.components.at(i)));
-                else made.push_back(apply({x.components[i], y.components.at(i)}, [&](Values v) { return builder.CreateAdd(v[0], v[1]); }));
+                else
+                    made.push_back(apply({x.components[i], y.components.at(i)},
+                                         [&](Values v) { return builder.CreateAdd(v[0], v[1]); }));
             }
             return made;
         }
@@ -138,13 +141,15 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
                 const auto* amount = llvm::dyn_cast<llvm::ConstantInt>(b.value);
                 if (a.linear_base && amount && amount->getBitWidth() == 32 && amount->getZExtValue() < 31)
                     shifted.linear_base = builder.CreateShl(a.linear_base, amount->getZExtValue()),
-                    shifted.linear_stride = Component::wrapped(static_cast<std::uint64_t>(a.linear_stride) << amount->getZExtValue());
+                    shifted.linear_stride =
+                        Component::wrapped(static_cast<std::uint64_t>(a.linear_stride) << amount->getZExtValue());
                 made.push_back(shifted);
             }
             return made;
         }
         case Op::OpShiftRightLogical: return binary([&](auto* x, auto* y) { return math.shift_right_logical(x, y); });
-        case Op::OpShiftRightArithmetic: return binary([&](auto* x, auto* y) { return math.shift_right_arithmetic(x, y); });
+        case Op::OpShiftRightArithmetic:
+            return binary([&](auto* x, auto* y) { return math.shift_right_arithmetic(x, y); });
         case Op::OpSNegate: return unary([&](auto* x) { return builder.CreateNeg(x); });
         case Op::OpUDiv: return binary([&](auto* x, auto* y) { return math.u_div(x, y); });
         case Op::OpSDiv: return binary([&](auto* x, auto* y) { return math.s_div(x, y); });
@@ -194,7 +199,8 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
                     const auto carried = op == Op::OpIAddCarry ? math.uadd_carry(a, b) : math.usub_borrow(a, b);
                     low.emplace_back(carried.result), high.emplace_back(carried.carry);
                 } else {
-                    const auto both_words = op == Op::OpUMulExtended ? math.umul_extended(a, b) : math.smul_extended(a, b);
+                    const auto both_words =
+                        op == Op::OpUMulExtended ? math.umul_extended(a, b) : math.smul_extended(a, b);
                     low.emplace_back(both_words.low), high.emplace_back(both_words.high);
                 }
             }
@@ -203,7 +209,8 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
         }
 
         // Logic.
-        case Op::OpLogicalEqual: return binary([&](auto* x, auto* y) { return builder.CreateNot(builder.CreateXor(x, y)); });
+        case Op::OpLogicalEqual:
+            return binary([&](auto* x, auto* y) { return builder.CreateNot(builder.CreateXor(x, y)); });
         case Op::OpLogicalNotEqual: return binary([&](auto* x, auto* y) { return builder.CreateXor(x, y); });
         case Op::OpLogicalOr: return binary([&](auto* x, auto* y) { return builder.CreateOr(x, y); });
         case Op::OpLogicalAnd: return binary([&](auto* x, auto* y) { return builder.CreateAnd(x, y); });
@@ -223,7 +230,8 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
             const std::vector<Component> yes = get_components(operands[1]), no = get_components(operands[2]);
             std::vector<Component> made;
             for (std::size_t i = 0; i < yes.size(); ++i) {
-                const Component& which = condition.components.size() == 1 ? condition.components[0] : condition.components.at(i);
+                const Component& which =
+                    condition.components.size() == 1 ? condition.components[0] : condition.components.at(i);
                 if (which.is_uniform() && !(yes[i].is_uniform() && no.at(i).is_uniform()))
                     made.emplace_back(select(which.value, widen(yes[i]), widen(no.at(i))));
                 else
@@ -256,10 +264,16 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
         case Op::OpDot: {
             const Value x = get(operands[0]), y = get(operands[1]);
             Component sum = product(x.components.at(0), y.components.at(0));
-            for (std::size_t i = 1; i < x.components.size(); ++i) sum = multiply_add(x.components[i], y.components.at(i), sum);
+            for (std::size_t i = 1; i < x.components.size(); ++i)
+                sum = multiply_add(x.components[i], y.components.at(i), sum);
             return {sum};
         }
-        case Op::OpSDot: case Op::OpUDot: case Op::OpSUDot: case Op::OpSDotAccSat: case Op::OpUDotAccSat: case Op::OpSUDotAccSat: {
+        case Op::OpSDot:
+        case Op::OpUDot:
+        case Op::OpSUDot:
+        case Op::OpSDotAccSat:
+        case Op::OpUDotAccSat:
+        case Op::OpSUDotAccSat: {
             const bool is_unsigned = op == Op::OpUDot || op == Op::OpUDotAccSat;
             const bool is_mixed = op == Op::OpSUDot || op == Op::OpSUDotAccSat;
             const bool accumulates = op == Op::OpSDotAccSat || op == Op::OpUDotAccSat || op == Op::OpSUDotAccSat;
@@ -272,16 +286,19 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
                     parts.clear();
                     for (unsigned shift = 0; shift < 32; shift += 8)
                         parts.push_back(apply({word}, [&](Values v) {
-                            return builder.CreateTrunc(builder.CreateLShr(v[0], shift), like(v[0], builder.getInt8Ty()));
+                            return builder.CreateTrunc(builder.CreateLShr(v[0], shift),
+                                                       like(v[0], builder.getInt8Ty()));
                         }));
                 }
                 for (Component& part : parts)
                     part = apply({part}, [&](Values v) {
-                        return zero_extends ? builder.CreateZExtOrTrunc(v[0], like(v[0], kind)) : builder.CreateSExtOrTrunc(v[0], like(v[0], kind));
+                        return zero_extends ? builder.CreateZExtOrTrunc(v[0], like(v[0], kind))
+                                            : builder.CreateSExtOrTrunc(v[0], like(v[0], kind));
                     });
                 return parts;
             };
-            const std::vector<Component> x = elements(operands[0], is_unsigned), y = elements(operands[1], is_unsigned || is_mixed);
+            const std::vector<Component> x = elements(operands[0], is_unsigned),
+                                         y = elements(operands[1], is_unsigned || is_mixed);
             Component sum;
             for (std::size_t i = 0; i < x.size(); ++i) {
                 const Component term = apply({x[i], y.at(i)}, [&](Values v) { return builder.CreateMul(v[0], v[1]); });
@@ -289,7 +306,8 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
             }
             if (accumulates)
                 sum = apply({sum, get_scalar(operands[2])}, [&](Values v) {
-                    return builder.CreateBinaryIntrinsic(is_unsigned ? llvm::Intrinsic::uadd_sat : llvm::Intrinsic::sadd_sat, v[0], v[1]);
+                    return builder.CreateBinaryIntrinsic(
+                        is_unsigned ? llvm::Intrinsic::uadd_sat : llvm::Intrinsic::sadd_sat, v[0], v[1]);
                 });
             return {sum};
         }
@@ -376,7 +394,8 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
             return unary([&](auto* x) { return math.quantize_to_f16(x); });
         case Op::OpBitcast: {
             const Value from = get(operands[0]);
-            if (from.pointer || module.type(type_id).kind == TypeKind::pointer) reject("casts of pointers are not supported");
+            if (from.pointer || module.type(type_id).kind == TypeKind::pointer)
+                reject("casts of pointers are not supported");
             const Type &source = scalar_of(operand_type(0)), &to = scalar_of(type_id);
             const auto is_narrow = [](const Type& scalar) {
                 return scalar.kind == TypeKind::floating && scalar.bits < 64;
@@ -398,7 +417,8 @@ std::vector<Component> Emitter::evaluate(Op op, Id type_id, std::span<const std:
                             llvm::Value* bits = builder.CreateZExt(v[0], like(v[0], wide));
                             return k ? builder.CreateShl(bits, k * source.bits) : bits;
                         });
-                        whole = whole ? apply({whole, part}, [&](Values v) { return builder.CreateOr(v[0], v[1]); }) : part;
+                        whole =
+                            whole ? apply({whole, part}, [&](Values v) { return builder.CreateOr(v[0], v[1]); }) : part;
                     }
                     made.push_back(of_bits(whole, to));
                 }

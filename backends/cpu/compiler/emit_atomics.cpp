@@ -18,7 +18,8 @@ void Emitter::for_each_lane(llvm::Value* lanes_on, const std::function<void(llvm
     builder.SetInsertPoint(loop);
     llvm::PHINode* rest = builder.CreatePHI(builder.getInt32Ty(), 2, "rest");
     rest->addIncoming(bits, before);
-    llvm::Value* lane = builder.CreateIntrinsic(llvm::Intrinsic::cttz, {builder.getInt32Ty()}, {rest, builder.getTrue()});
+    llvm::Value* lane =
+        builder.CreateIntrinsic(llvm::Intrinsic::cttz, {builder.getInt32Ty()}, {rest, builder.getTrue()});
     body(lane);
     llvm::Value* fewer = builder.CreateAnd(rest, builder.CreateSub(rest, int32(1)));
     rest->addIncoming(fewer, builder.GetInsertBlock());
@@ -139,7 +140,9 @@ bool Emitter::emit_atomic(const Instruction& at) {
         case Op::OpAtomicLoad: is_load = true; break;
         case Op::OpAtomicStore: is_store = true; break;
         case Op::OpAtomicExchange: operation = Operation::Xchg, image_operation = AtomicOperation::exchange; break;
-        case Op::OpAtomicCompareExchange: is_exchange_if = true, image_operation = AtomicOperation::compare_exchange; break;
+        case Op::OpAtomicCompareExchange:
+            is_exchange_if = true, image_operation = AtomicOperation::compare_exchange;
+            break;
         case Op::OpAtomicIIncrement: operation = Operation::Add, is_constant_one = true; break;
         case Op::OpAtomicIDecrement: operation = Operation::Sub, is_constant_one = is_negated = true; break;
         case Op::OpAtomicIAdd: operation = Operation::Add; break;
@@ -177,7 +180,8 @@ bool Emitter::emit_atomic(const Instruction& at) {
             std::vector<Component> texel;
             if (is_store) texel.push_back(value);
             texel = image_call(pointer.image_descriptor, Component(), pointer.image_type, pointer.coordinates,
-                               static_cast<std::uint32_t>(is_load ? ImageOperation::load : ImageOperation::store) | image_integer_flag(pointer.image_type),
+                               static_cast<std::uint32_t>(is_load ? ImageOperation::load : ImageOperation::store) |
+                                   image_integer_flag(pointer.image_type),
                                texel, pointer.sample);
             if (is_load) finish(from_word(texel.at(0), kind));
             return true;
@@ -185,7 +189,8 @@ bool Emitter::emit_atomic(const Instruction& at) {
         set_image_atomic(image_operation, comparator);
         const std::vector<Component> old =
             image_call(pointer.image_descriptor, Component(), pointer.image_type, pointer.coordinates,
-                       static_cast<std::uint32_t>(ImageOperation::atomic) | image_integer_flag(pointer.image_type), {value}, pointer.sample);
+                       static_cast<std::uint32_t>(ImageOperation::atomic) | image_integer_flag(pointer.image_type),
+                       {value}, pointer.sample);
         finish(from_word(old.at(0), kind));
         return true;
     }
@@ -194,23 +199,28 @@ bool Emitter::emit_atomic(const Instruction& at) {
 
     if (options.checks) check_range(pointer);
     if (follows_undefined())
-        check_memory(pointer, 0, scalar,
-                     access_atomic | (is_load ? 0u : std::uint32_t{access_write}) | (is_store ? 0u : std::uint32_t{access_read}), nullptr);
+        check_memory(
+            pointer, 0, scalar,
+            access_atomic | (is_load ? 0u : std::uint32_t{access_write}) | (is_store ? 0u : std::uint32_t{access_read}),
+            nullptr);
     const Component ok = allowed(pointer, 0, scalar.bits / 8);
     llvm::Value* lanes_on = both(is_load ? mask : effect_mask(), ok ? ok.value : nullptr);
     llvm::Value* address = addresses(pointer, 0);
     const llvm::Align alignment(scalar.bits / 8);
     // All invocations of a workgroup run on one thread, one subgroup after another.
-    const bool is_own = pointer.storage == spv::StorageClass::Workgroup && operation && scalar.kind == TypeKind::integer;
+    const bool is_own =
+        pointer.storage == spv::StorageClass::Workgroup && operation && scalar.kind == TypeKind::integer;
     const auto change = [&](llvm::Value* place, llvm::Value* by) -> llvm::Value* {
         if (!is_own)
-            return builder.CreateAtomicRMW(*operation, place, by, alignment, llvm::AtomicOrdering::SequentiallyConsistent);
+            return builder.CreateAtomicRMW(*operation, place, by, alignment,
+                                           llvm::AtomicOrdering::SequentiallyConsistent);
         llvm::Value* old = builder.CreateAlignedLoad(kind, place, alignment);
         builder.CreateAlignedStore(combine(*operation, old, by), place, alignment);
         return old;
     };
     const auto found_use = frame->shape->uses.find(at.result);
-    const bool is_unused = at.result && !trace_table && found_use != frame->shape->uses.end() && !found_use->second.is_used;
+    const bool is_unused =
+        at.result && !trace_table && found_use != frame->shape->uses.end() && !found_use->second.is_used;
     // Where nobody asks for the old values, lanes that mean one place change it once for all of them.
     if (is_unused && operation && can_combine(*operation, kind)) {
         const auto change_once = [&](llvm::Value* place, llvm::Value* of) {
@@ -234,7 +244,9 @@ bool Emitter::emit_atomic(const Instruction& at) {
     llvm::AllocaInst* results = make_slot(vector_of(kind), "atomic");
     builder.CreateStore(llvm::Constant::getNullValue(vector_of(kind)), results);
     for_each_lane(lanes_on, [&](llvm::Value* lane) {
-        const auto of_lane = [&](llvm::Value* x) { return x->getType()->isVectorTy() ? builder.CreateExtractElement(x, lane) : x; };
+        const auto of_lane = [&](llvm::Value* x) {
+            return x->getType()->isVectorTy() ? builder.CreateExtractElement(x, lane) : x;
+        };
         llvm::Value* place = of_lane(address);
         llvm::Value* old = nullptr;
         if (is_load) {
@@ -245,8 +257,8 @@ bool Emitter::emit_atomic(const Instruction& at) {
             llvm::StoreInst* stored = builder.CreateAlignedStore(of_lane(value.value), place, alignment);
             stored->setAtomic(llvm::AtomicOrdering::SequentiallyConsistent);
         } else if (is_exchange_if) {
-            llvm::Value* pair = builder.CreateAtomicCmpXchg(place, of_lane(comparator.value), of_lane(value.value), alignment,
-                                                            llvm::AtomicOrdering::SequentiallyConsistent,
+            llvm::Value* pair = builder.CreateAtomicCmpXchg(place, of_lane(comparator.value), of_lane(value.value),
+                                                            alignment, llvm::AtomicOrdering::SequentiallyConsistent,
                                                             llvm::AtomicOrdering::SequentiallyConsistent);
             old = builder.CreateExtractValue(pair, 0);
         } else {

@@ -14,7 +14,8 @@ void Emitter::share_environment() {
     const auto& functions = module.functions();
     if (std::ranges::any_of(functions, [&](const auto& entry) {
             return entry.first != module.entry().id && std::ranges::any_of(entry.second.blocks, [](const Block& block) {
-                       return block.terminator.op == spv::Op::OpKill || block.terminator.op == spv::Op::OpTerminateInvocation;
+                       return block.terminator.op == spv::Op::OpKill ||
+                              block.terminator.op == spv::Op::OpTerminateInvocation;
                    });
         })) {
         killed_slot = make_slot(mask_type, "killed");
@@ -28,7 +29,8 @@ void Emitter::share_environment() {
     std::ranges::sort(ids);
     for (const Id id : ids) {
         places.push_back(&lane_variables[id]->memory);
-        for (Component& component : lane_variables[id]->components) places.insert(places.end(), {&component.value, &component.linear_base});
+        for (Component& component : lane_variables[id]->components)
+            places.insert(places.end(), {&component.value, &component.linear_base});
     }
     ids.clear();
     for (const auto& [id, query] : ray_queries) ids.push_back(id);
@@ -51,7 +53,8 @@ std::vector<llvm::Type*> Emitter::argument_types(const Instruction& parameter) {
     const auto shaped = [&](llvm::Type* kind) { return is_uniform ? kind : static_cast<llvm::Type*>(vector_of(kind)); };
     std::vector<llvm::Type*> types;
     if (type.components > 0) {
-        for_each_component_type(parameter.type, [&](const Type& scalar) { types.push_back(shaped(scalar_type(scalar))); });
+        for_each_component_type(parameter.type,
+                                [&](const Type& scalar) { types.push_back(shaped(scalar_type(scalar))); });
     } else if (type.is_opaque()) {
         types.assign(2, shaped(pointer_type));
     } else if (type.kind == TypeKind::pointer) {
@@ -66,7 +69,9 @@ std::vector<llvm::Type*> Emitter::argument_types(const Instruction& parameter) {
 Emitter::Argument Emitter::argument(const Instruction& parameter, Id id) {
     const Type& type = module.type(parameter.type);
     const bool is_uniform = !uniformity.is_divergent(parameter.result);
-    const auto shaped = [&](const Component& component) { return is_uniform ? narrow(component, mask) : widen(component); };
+    const auto shaped = [&](const Component& component) {
+        return is_uniform ? narrow(component, mask) : widen(component);
+    };
     Argument made;
     if (type.components > 0) {
         for (const Component& component : get_components(id)) made.values.push_back(shaped(component));
@@ -84,8 +89,9 @@ Emitter::Argument Emitter::argument(const Instruction& parameter, Id id) {
         return made;
     }
     // A whole variable of which each lane has its own.
-    made.fits = pointer.kind == Pointer::Kind::lanes && pointer.component == 0 && !pointer.dynamic_component && !pointer.valid &&
-                pointer.variable->memory && !pointer.variable->is_uniform && pointer.variable->type == pointer.type;
+    made.fits = pointer.kind == Pointer::Kind::lanes && pointer.component == 0 && !pointer.dynamic_component &&
+                !pointer.valid && pointer.variable->memory && !pointer.variable->is_uniform &&
+                pointer.variable->type == pointer.type;
     if (made.fits) made.values.push_back(pointer.variable->memory);
     return made;
 }
@@ -132,10 +138,12 @@ llvm::Function* Emitter::kept_function(const Function& callee) {
     first_argument.push_back(types.size());
     std::vector<llvm::Type*> results;
     if (module.type(callee.return_type).components > 0)
-        for_each_component_type(callee.return_type, [&](const Type& scalar) { results.push_back(vector_of(scalar_type(scalar))); });
-    llvm::Type* result_type = results.empty() ? builder.getVoidTy() : static_cast<llvm::Type*>(llvm::StructType::get(context, results));
-    llvm::Function* made = llvm::Function::Create(llvm::FunctionType::get(result_type, types, false), llvm::Function::InternalLinkage,
-                                                  "function", target);
+        for_each_component_type(callee.return_type,
+                                [&](const Type& scalar) { results.push_back(vector_of(scalar_type(scalar))); });
+    llvm::Type* result_type =
+        results.empty() ? builder.getVoidTy() : static_cast<llvm::Type*>(llvm::StructType::get(context, results));
+    llvm::Function* made = llvm::Function::Create(llvm::FunctionType::get(result_type, types, false),
+                                                  llvm::Function::InternalLinkage, "function", target);
     kept_.emplace(callee.id, made);
 
     // What belongs to the function from which the call was found is put aside.
@@ -156,13 +164,15 @@ llvm::Function* Emitter::kept_function(const Function& callee) {
     llvm::BasicBlock* start = llvm::BasicBlock::Create(context, "start", made);
     builder.SetInsertPoint(start);
     for (unsigned i = 0; i < shared_places_.size(); ++i)
-        *shared_places_[i] = builder.CreateLoad(environment_type_->getElementType(i), builder.CreateStructGEP(environment_type_, environment_, i));
+        *shared_places_[i] = builder.CreateLoad(environment_type_->getElementType(i),
+                                                builder.CreateStructGEP(environment_type_, environment_, i));
     std::vector<llvm::Value*> arguments;
     for (llvm::Argument& argument : made->args()) arguments.push_back(&argument);
     std::vector<Value> values;
     for (std::size_t i = 0; i < callee.parameters.size(); ++i)
-        values.push_back(parameter_value(callee.parameters[i],
-                                         std::span(arguments).subspan(first_argument[i], first_argument[i + 1] - first_argument[i])));
+        values.push_back(parameter_value(
+            callee.parameters[i],
+            std::span(arguments).subspan(first_argument[i], first_argument[i + 1] - first_argument[i])));
     const std::vector<Component> returned = emit_function(callee, values, made->getArg(1));
     if (results.empty()) {
         builder.CreateRetVoid();
@@ -204,7 +214,8 @@ void Emitter::emit_call(const Instruction& at) {
             llvm::Value* result = builder.CreateCall(kept_function(callee), values);
             if (!has_result) return;
             std::vector<Component> components;
-            for (unsigned i = 0; i < module.type(at.type).components; ++i) components.emplace_back(builder.CreateExtractValue(result, i));
+            for (unsigned i = 0; i < module.type(at.type).components; ++i)
+                components.emplace_back(builder.CreateExtractValue(result, i));
             return set(at, std::move(components));
         }
     }

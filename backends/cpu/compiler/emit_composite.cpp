@@ -19,7 +19,10 @@ struct Part {
 bool Emitter::emit_composite(const Instruction& at) {
     if (!at.result || !at.type) return false;
     switch (at.op) {
-        case Op::OpCompositeConstruct: case Op::OpCompositeExtract: case Op::OpCompositeInsert: case Op::OpVectorShuffle:
+        case Op::OpCompositeConstruct:
+        case Op::OpCompositeExtract:
+        case Op::OpCompositeInsert:
+        case Op::OpVectorShuffle:
         case Op::OpVectorExtractDynamic: case Op::OpVectorInsertDynamic:
             set(at, evaluate_composite(at.op, at.type, at.operands));
             return true;
@@ -60,7 +63,8 @@ std::vector<Component> Emitter::evaluate_composite(Op op, Id type_id, std::span<
             const Value from = get(operands[0]);
             const Part part = part_at(module.type_of(operands[0]), operands.subspan(1));
             const std::uint32_t count = module.type(part.type).components;
-            return std::vector<Component>(from.components.begin() + part.first, from.components.begin() + part.first + count);
+            return std::vector<Component>(from.components.begin() + part.first,
+                                          from.components.begin() + part.first + count);
         }
         case Op::OpCompositeInsert: {
             const std::vector<Component> object = get_components(operands[0]);

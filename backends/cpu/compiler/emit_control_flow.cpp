@@ -38,7 +38,8 @@ const Emitter::Shape& Emitter::shape_of(const Function& function) {
         for (std::uint32_t i = header; i < end; ++i) {
             shape.blocks[i].divergent_loop = header;
             for (const Id successor : function.blocks[i].successors)
-                if (const auto to = function.find_block(successor); to && (*to < header || *to >= end)) loop.targets.push_back(*to);
+                if (const auto to = function.find_block(successor); to && (*to < header || *to >= end))
+                    loop.targets.push_back(*to);
         }
         std::ranges::sort(loop.targets);
         loop.targets.erase(std::ranges::unique(loop.targets).begin(), loop.targets.end());
@@ -64,7 +65,8 @@ const Emitter::Shape& Emitter::shape_of(const Function& function) {
             if (function.blocks[i].successors.empty()) meets = false;
             for (const Id successor : function.blocks[i].successors) {
                 const auto to = function.find_block(successor);
-                if (!to || *to > *merge_block || *to < header || (*to == header && !block.continue_target)) meets = false;
+                if (!to || *to > *merge_block || *to < header || (*to == header && !block.continue_target))
+                    meets = false;
             }
         }
         for (const std::uint32_t from : function.blocks[*merge_block].predecessors)
@@ -82,7 +84,8 @@ void Emitter::find_uses(const Function& function, Shape& shape) const {
         if (!at.type || !module.has_type(at.type)) return false;
         const Type& type = module.type(at.type);
         // Pointers that depend on control flow are values.
-        const bool is_value = at.op == Op::OpSelect || at.op == Op::OpLoad || at.op == Op::OpFunctionCall || at.op == Op::OpCompositeExtract;
+        const bool is_value = at.op == Op::OpSelect || at.op == Op::OpLoad || at.op == Op::OpFunctionCall ||
+                              at.op == Op::OpCompositeExtract;
         return type.is_opaque() || (type.kind == TypeKind::pointer && !is_value);
     };
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -218,7 +221,8 @@ bool Emitter::is_cheap(std::uint32_t index) const {
         switch (at.op) {
             case Op::OpStore: case Op::OpLoad: {
                 const Type& type = module.type(module.type_of(at.operand(0)));
-                if (type.storage != spv::StorageClass::Function && type.storage != spv::StorageClass::Private) return false;
+                if (type.storage != spv::StorageClass::Function && type.storage != spv::StorageClass::Private)
+                    return false;
                 break;
             }
             case Op::OpFAdd: case Op::OpFSub: case Op::OpFMul: case Op::OpFNegate: case Op::OpIAdd: case Op::OpISub:
@@ -338,8 +342,10 @@ void Emitter::emit_loop_body(std::uint32_t header, std::uint32_t end, llvm::Valu
     // Lanes that leave in different iterations gather outside.
     if (is_divergent) {
         for (const std::uint32_t target_block : shape.targets) {
-            Arrival& arrival = target_block < header ? frame->blocks[target_block].back : frame->blocks[target_block].arrival;
-            const std::uint32_t last_use = target_block < header ? frame->shape->blocks[target_block].end : target_block;
+            Arrival& arrival =
+                target_block < header ? frame->blocks[target_block].back : frame->blocks[target_block].arrival;
+            const std::uint32_t last_use =
+                target_block < header ? frame->shape->blocks[target_block].end : target_block;
             if (!frame->shape->blocks[target_block].is_reconverged || target_block < header) {
                 carry(arrival.reached, builder.getInt1Ty(), builder.getFalse(), last_use);
                 carry(arrival.mask, mask_type, none, last_use);
@@ -366,7 +372,8 @@ void Emitter::emit_loop_body(std::uint32_t header, std::uint32_t end, llvm::Valu
     }
     if (shape.returns_values)
         for (std::uint32_t i = 0; i < frame->returned.size(); ++i)
-            carry(frame->returned[i], vector_of(scalar_type(module.type(component_type(function.return_type, i)))), nullptr, ~0u);
+            carry(frame->returned[i], vector_of(scalar_type(module.type(component_type(function.return_type, i)))),
+                  nullptr, ~0u);
 
     emit_block(header, is_divergent ? loop_mask : entry_mask);
     emit_range(header + 1, end);
@@ -377,7 +384,8 @@ void Emitter::emit_loop_body(std::uint32_t header, std::uint32_t end, llvm::Valu
         llvm::Value* execution = load_context(offsetof(ShaderContext, state), pointer_type);
         llvm::LoadInst* expired = builder.CreateAlignedLoad(builder.getInt32Ty(), execution, llvm::Align(4));
         expired->setAtomic(llvm::AtomicOrdering::Monotonic);
-        builder.CreateCondBr(builder.CreateAnd(state.back.reached, builder.CreateICmpEQ(expired, int32(0))), head, after);
+        builder.CreateCondBr(builder.CreateAnd(state.back.reached, builder.CreateICmpEQ(expired, int32(0))), head,
+                             after);
         if (loop_mask) loop_mask->addIncoming(state.back.mask, bottom);
         for (std::size_t i = 0; i < own.size(); ++i)
             for (std::size_t k = 0; k < own[i].size(); ++k) {
@@ -450,8 +458,8 @@ void Emitter::emit_terminator(std::uint32_t index) {
             const std::size_t step = type.bits > 32 ? 3 : 2;
             std::vector<std::pair<Id, llvm::Value*>> targets;
             llvm::Type* kind = selector.value->getType();
-            llvm::Value* none = llvm::ConstantInt::getFalse(selector.is_uniform() ? builder.getInt1Ty()
-                                                                                  : static_cast<llvm::Type*>(mask_type));
+            llvm::Value* none = llvm::ConstantInt::getFalse(
+                selector.is_uniform() ? builder.getInt1Ty() : static_cast<llvm::Type*>(mask_type));
             llvm::Value* matched = none;
             const auto condition_of = [&](Id block) -> llvm::Value*& {
                 for (auto& [id, condition] : targets)
@@ -489,7 +497,8 @@ void Emitter::emit_terminator(std::uint32_t index) {
                 llvm::Value* none = llvm::Constant::getNullValue(mask_type);
                 store_live(builder.CreateSelect(mask, none, live()));
             }
-            if (killed_slot) builder.CreateStore(builder.CreateOr(mask, builder.CreateLoad(mask_type, killed_slot)), killed_slot);
+            if (killed_slot)
+                builder.CreateStore(builder.CreateOr(mask, builder.CreateLoad(mask_type, killed_slot)), killed_slot);
             return;
         case Op::OpReturn:
         case Op::OpUnreachable:
@@ -539,8 +548,9 @@ void Emitter::emit_edge(std::uint32_t from, Id to, llvm::Value* condition) {
 
     // Where all lanes of the header meet again nothing needs to be counted.
     if (frame->shape->blocks[*target_index].is_reconverged && !is_back) return;
-    // One way in: the mask counts only if the block is reached, so a scalar condition need not clear it. It must where the
-    // block runs whether it is reached or not: of a vector that differs between lanes, one component may be a scalar.
+    // One way in: the mask counts only if the block is reached, so a scalar condition need not clear it. It must where
+    // the block runs whether it is reached or not: of a vector that differs between lanes, one component may be a
+    // scalar.
     const bool is_plain = !arrival.reached && !may_end && block.predecessors.size() == 1 && condition &&
                           !condition->getType()->isVectorTy() && !is_cheap(*target_index);
     llvm::Value* lanes_coming = is_plain ? mask : edge_mask;

@@ -19,7 +19,11 @@ class MatrixArithmetic {
     using Multiply = std::function<Component(const Component&, const Component&)>;
     MatrixArithmetic(std::uint32_t size, const std::vector<Component>& elements, Multiply multiply, Multiply subtract,
                      Multiply add)
-        : size_(size), elements_(elements), multiply_(std::move(multiply)), subtract_(std::move(subtract)), add_(std::move(add)) {}
+        : size_(size),
+          elements_(elements),
+          multiply_(std::move(multiply)),
+          subtract_(std::move(subtract)),
+          add_(std::move(add)) {}
 
     /// Of the matrix without the columns and rows that are left out.
     [[nodiscard]] Component minor(std::vector<std::uint32_t> columns, std::vector<std::uint32_t> rows) const {
@@ -57,7 +61,8 @@ class MatrixArithmetic {
 
 bool Emitter::emit_extended(const Instruction& at) {
     if (at.op != Op::OpExtInst) return false;
-    if (const std::string* set = module.foreign_set(at.operand(0))) reject(fmt::format("instruction {} of {} is not supported", at.operand(1), *set));
+    if (const std::string* set = module.foreign_set(at.operand(0)))
+        reject(fmt::format("instruction {} of {} is not supported", at.operand(1), *set));
     if (!module.is_glsl_set(at.operand(0))) return true;  // Debug information and the like: no effect on values.
     const auto number = static_cast<GLSLstd450>(at.operand(1));
     const auto argument = [&](std::size_t i) { return get(at.operand(2 + i)); };
@@ -73,7 +78,8 @@ bool Emitter::emit_extended(const Instruction& at) {
         const Value x = argument(0), y = argument(1);
         std::vector<Component> made;
         for (std::size_t i = 0; i < x.components.size(); ++i)
-            made.push_back(apply({x.components[i], y.components.at(i)}, [&](Values v) { return function(v[0], v[1]); }));
+            made.push_back(
+                apply({x.components[i], y.components.at(i)}, [&](Values v) { return function(v[0], v[1]); }));
         set(at, std::move(made));
         return true;
     };
@@ -114,7 +120,8 @@ bool Emitter::emit_extended(const Instruction& at) {
     } reset{builder};
 
     switch (number) {
-        case GLSLstd450Round: return map1([&](auto* x) { return math.round_even(x); });  // Either way is allowed for halves.
+        case GLSLstd450Round:
+            return map1([&](auto* x) { return math.round_even(x); });  // Either way is allowed for halves.
         case GLSLstd450RoundEven: return map1([&](auto* x) { return math.round_even(x); });
         case GLSLstd450Trunc: return map1([&](auto* x) { return math.trunc(x); });
         case GLSLstd450FAbs: return map1([&](auto* x) { return math.f_abs(x); });
@@ -210,7 +217,10 @@ bool Emitter::emit_extended(const Instruction& at) {
                 })});
             return true;
         }
-        case GLSLstd450PackSnorm2x16: case GLSLstd450PackUnorm2x16: case GLSLstd450PackHalf2x16: case GLSLstd450PackDouble2x32: {
+        case GLSLstd450PackSnorm2x16:
+        case GLSLstd450PackUnorm2x16:
+        case GLSLstd450PackHalf2x16:
+        case GLSLstd450PackDouble2x32: {
             if (number != GLSLstd450PackDouble2x32) note_narrowed("packing");
             std::vector<Component> x = argument(0).components;
             set(at, {apply(x, [&](Values v) {
@@ -225,13 +235,17 @@ bool Emitter::emit_extended(const Instruction& at) {
         case GLSLstd450UnpackSnorm4x8: case GLSLstd450UnpackUnorm4x8: {
             note_narrowed("unpacking");
             const Component word = argument(0).components.at(0);
-            const auto four = number == GLSLstd450UnpackSnorm4x8 ? math.unpack_snorm4x8(word.value) : math.unpack_unorm4x8(word.value);
+            const auto four = number == GLSLstd450UnpackSnorm4x8 ? math.unpack_snorm4x8(word.value)
+                                                                 : math.unpack_unorm4x8(word.value);
             std::vector<Component> made;
             for (llvm::Value* component : four) made.push_back(from_single(component));
             set(at, std::move(made));
             return true;
         }
-        case GLSLstd450UnpackSnorm2x16: case GLSLstd450UnpackUnorm2x16: case GLSLstd450UnpackHalf2x16: case GLSLstd450UnpackDouble2x32: {
+        case GLSLstd450UnpackSnorm2x16:
+        case GLSLstd450UnpackUnorm2x16:
+        case GLSLstd450UnpackHalf2x16:
+        case GLSLstd450UnpackDouble2x32: {
             if (number != GLSLstd450UnpackDouble2x32) note_narrowed("unpacking");
             const Component word = argument(0).components.at(0);
             const auto two = number == GLSLstd450UnpackSnorm2x16   ? math.unpack_snorm2x16(word.value)
@@ -254,7 +268,8 @@ bool Emitter::emit_extended(const Instruction& at) {
         case GLSLstd450Distance: {
             const Value x = argument(0), y = argument(1);
             std::vector<Component> between;
-            for (std::size_t i = 0; i < x.components.size(); ++i) between.push_back(f_subtract(x.components[i], y.components.at(i)));
+            for (std::size_t i = 0; i < x.components.size(); ++i)
+                between.push_back(f_subtract(x.components[i], y.components.at(i)));
             if (between.size() == 1)
                 set(at, {apply({between[0]}, [&](Values v) { return math.f_abs(v[0]); })});
             else
@@ -265,7 +280,8 @@ bool Emitter::emit_extended(const Instruction& at) {
             const Value x = argument(0), y = argument(1);
             const auto& a = x.components;
             const auto& b = y.components;
-            set(at, {f_subtract(f_multiply(a[1], b[2]), f_multiply(b[1], a[2])), f_subtract(f_multiply(a[2], b[0]), f_multiply(b[2], a[0])),
+            set(at, {f_subtract(f_multiply(a[1], b[2]), f_multiply(b[1], a[2])),
+                     f_subtract(f_multiply(a[2], b[0]), f_multiply(b[2], a[0])),
                      f_subtract(f_multiply(a[0], b[1]), f_multiply(b[0], a[1]))});
             return true;
         }
@@ -274,7 +290,8 @@ bool Emitter::emit_extended(const Instruction& at) {
             // NaN has no sign, and stays.
             if (x.components.size() == 1)
                 return map1([&](auto* v) { return select(builder.CreateFCmpUNO(v, v), v, math.sign(v)); });
-            const Component scale = apply({dot(x.components, x.components)}, [&](Values v) { return math.inverse_sqrt(v[0]); });
+            const Component scale =
+                apply({dot(x.components, x.components)}, [&](Values v) { return math.inverse_sqrt(v[0]); });
             std::vector<Component> made;
             for (const Component& component : x.components) made.push_back(f_multiply(component, scale));
             set(at, std::move(made));
@@ -287,7 +304,8 @@ bool Emitter::emit_extended(const Instruction& at) {
             });
             std::vector<Component> made;
             for (const Component& component : n.components)
-                made.push_back(apply({faces, component, f_negate(component)}, [&](Values v) { return select(v[0], v[1], v[2]); }));
+                made.push_back(
+                    apply({faces, component, f_negate(component)}, [&](Values v) { return select(v[0], v[1], v[2]); }));
             set(at, std::move(made));
             return true;
         }
@@ -306,13 +324,17 @@ bool Emitter::emit_extended(const Instruction& at) {
             const Component eta = argument(2).components.at(0);
             const Component cosine = dot(n.components, i.components);
             const Component one = apply({cosine}, [&](Values v) { return number_like(v[0], 1); });
-            const Component k = f_subtract(one, f_multiply(f_multiply(eta, eta), f_subtract(one, f_multiply(cosine, cosine))));
-            const Component is_reflected = apply({k}, [&](Values v) { return builder.CreateFCmpOLT(v[0], number_like(v[0], 0)); });
+            const Component k =
+                f_subtract(one, f_multiply(f_multiply(eta, eta), f_subtract(one, f_multiply(cosine, cosine))));
+            const Component is_reflected =
+                apply({k}, [&](Values v) { return builder.CreateFCmpOLT(v[0], number_like(v[0], 0)); });
             const Component along = f_add(f_multiply(eta, cosine), root(k));
             std::vector<Component> made;
             for (std::size_t c = 0; c < i.components.size(); ++c) {
-                const Component bent = f_subtract(f_multiply(eta, i.components[c]), f_multiply(along, n.components.at(c)));
-                made.push_back(apply({is_reflected, bent}, [&](Values v) { return select(v[0], number_like(v[1], 0), v[1]); }));
+                const Component bent =
+                    f_subtract(f_multiply(eta, i.components[c]), f_multiply(along, n.components.at(c)));
+                made.push_back(
+                    apply({is_reflected, bent}, [&](Values v) { return select(v[0], number_like(v[1], 0), v[1]); }));
             }
             set(at, std::move(made));
             return true;
@@ -326,7 +348,8 @@ bool Emitter::emit_extended(const Instruction& at) {
                 set(at, {matrix.minor(all, all)});
                 return true;
             }
-            std::vector<Component> cofactors(std::size_t{size} * size);  // Of column c and row r at r * size + c: transposed.
+            std::vector<Component> cofactors(std::size_t{size} *
+                                             size);  // Of column c and row r at r * size + c: transposed.
             for (std::uint32_t c = 0; c < size; ++c)
                 for (std::uint32_t r = 0; r < size; ++r) {
                     Component minor = matrix.minor(matrix.all_but(c), matrix.all_but(r));
@@ -340,7 +363,8 @@ bool Emitter::emit_extended(const Instruction& at) {
             }
             std::vector<Component> made;
             for (const Component& cofactor : cofactors)
-                made.push_back(apply({cofactor, determinant}, [&](Values v) { return builder.CreateFDiv(v[0], v[1]); }));
+                made.push_back(
+                    apply({cofactor, determinant}, [&](Values v) { return builder.CreateFDiv(v[0], v[1]); }));
             set(at, std::move(made));
             return true;
         }

@@ -73,7 +73,8 @@ Component Emitter::to_word(const Component& value) {
             return builder.CreateBitCast(builder.CreateFPTrunc(v[0], like(v[0], builder.getFloatTy())),
                                          like(v[0], builder.getInt32Ty()));
         if (scalar->isHalfTy())
-            return builder.CreateBitCast(math.convert_float(v[0], builder.getFloatTy()), like(v[0], builder.getInt32Ty()));
+            return builder.CreateBitCast(math.convert_float(v[0], builder.getFloatTy()),
+                                         like(v[0], builder.getInt32Ty()));
         return builder.CreateZExtOrTrunc(v[0], like(v[0], builder.getInt32Ty()));
     });
 }
@@ -350,7 +351,8 @@ bool Emitter::emit_image(const Instruction& at) {
                                level.value->getType()->isIntegerTy(32) &&
                                coordinates.at(0).value->getType()->getScalarType()->isIntegerTy(32);
     if (operation == ImageOperation::store) {
-        if (!may_be_direct || !store_directly(image.image, image.image_type, coordinates, texel, [&] { call(); })) call();
+        if (!may_be_direct || !store_directly(image.image, image.image_type, coordinates, texel, [&] { call(); }))
+            call();
         return true;
     }
     const bool is_one_texel = operation == ImageOperation::fetch && module.model == spv::ExecutionModel::Fragment &&

@@ -38,24 +38,29 @@ LaneVariable& Emitter::make_lane_variable(Id variable_id, Id type_id, bool is_un
         made->slot_bytes = slot_bytes_of(type);
         const std::uint64_t bytes = std::uint64_t{type.components} * made->slot_bytes * (is_uniform ? 1 : lanes);
         if (bytes > (1u << 24))
-            reject(fmt::format("a variable of {} scalars takes {} bytes for {} lanes; 16 MiB is the most", type.components, bytes, lanes));
+            reject(fmt::format("a variable of {} scalars takes {} bytes for {} lanes; 16 MiB is the most",
+                               type.components, bytes, lanes));
         variable_bytes += bytes;
         if (variable_bytes > most_variable_bytes)
-            reject(fmt::format("the variables take {} bytes for {} lanes; {} is the most", variable_bytes, lanes, most_variable_bytes));
+            reject(fmt::format("the variables take {} bytes for {} lanes; {} is the most", variable_bytes, lanes,
+                               most_variable_bytes));
         if (bytes > most_stack_bytes_of_one || stack_bytes + bytes > most_stack_bytes)
             made->memory = large_memory(bytes);
         if (made->memory) return *made;
         stack_bytes += bytes;
         if (stack_bytes > most_stack_bytes && !is_on_heap())
-            reject(fmt::format("the variables take {} bytes of stack for {} lanes; {} is the most", stack_bytes, lanes, most_stack_bytes));
-        made->memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::max<std::uint64_t>(bytes, 1)), "variable");
+            reject(fmt::format("the variables take {} bytes of stack for {} lanes; {} is the most", stack_bytes, lanes,
+                               most_stack_bytes));
+        made->memory =
+            make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::max<std::uint64_t>(bytes, 1)), "variable");
         if (follows_undefined()) {
             made->undefined = std::make_unique<LaneVariable>();
             made->undefined->type = type_id;
             made->undefined->is_uniform = is_uniform;
-            made->undefined->memory = make_slot(
-                llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * 4 * (is_uniform ? 1 : lanes)),
-                "undefined");
+            made->undefined->memory =
+                make_slot(llvm::ArrayType::get(builder.getInt8Ty(),
+                                               std::uint64_t{type.components} * 4 * (is_uniform ? 1 : lanes)),
+                          "undefined");
         }
     }
     return *made;
@@ -70,13 +75,16 @@ void Emitter::hold_constant(LaneVariable& variable, Id content) {
     for (const Component& component : value.components) {
         // Undefined ones are zero as good as anything.
         llvm::APInt bits(64, 0);
-        if (const auto* integer = llvm::dyn_cast<llvm::ConstantInt>(component.value)) bits = integer->getValue().zextOrTrunc(64);
-        if (const auto* number = llvm::dyn_cast<llvm::ConstantFP>(component.value)) bits = number->getValueAPF().bitcastToAPInt().zextOrTrunc(64);
+        if (const auto* integer = llvm::dyn_cast<llvm::ConstantInt>(component.value))
+            bits = integer->getValue().zextOrTrunc(64);
+        if (const auto* number = llvm::dyn_cast<llvm::ConstantFP>(component.value))
+            bits = number->getValueAPF().bitcastToAPInt().zextOrTrunc(64);
         words.push_back(static_cast<std::uint32_t>(bits.getZExtValue()));
         if (variable.slot_bytes == 8) words.push_back(static_cast<std::uint32_t>(bits.getZExtValue() >> 32));
     }
     llvm::Constant* data = llvm::ConstantDataArray::get(context, words);
-    auto* global = new llvm::GlobalVariable(target, data->getType(), true, llvm::GlobalValue::InternalLinkage, data, "constant");
+    auto* global =
+        new llvm::GlobalVariable(target, data->getType(), true, llvm::GlobalValue::InternalLinkage, data, "constant");
     global->setAlignment(llvm::Align(64));
     variable.memory = global;
 }
@@ -89,7 +97,8 @@ void Emitter::fill(LaneVariable& variable, const std::vector<Component>& values)
             value = builder.CreateZExt(value, like(value, builder.getInt32Ty()));
         if (!variable.is_uniform) value = widen(Component(value));
         const std::uint64_t at = std::uint64_t{index++} * variable.slot_bytes * (variable.is_uniform ? 1 : lanes);
-        builder.CreateAlignedStore(value, at_offset(variable.memory, static_cast<std::int64_t>(at)), llvm::Align(variable.slot_bytes));
+        builder.CreateAlignedStore(value, at_offset(variable.memory, static_cast<std::int64_t>(at)),
+                                   llvm::Align(variable.slot_bytes));
     }
 }
 
@@ -109,7 +118,8 @@ Pointer Emitter::pointer_to(Id id) {
         case StorageClass::Input:
             pointer.kind = Pointer::Kind::lanes;
             pointer.variable_id = id;
-            if (const auto found = lane_variables.find(id); found != lane_variables.end()) pointer.variable = found->second.get();
+            if (const auto found = lane_variables.find(id); found != lane_variables.end())
+                pointer.variable = found->second.get();
             else if (variable.storage == StorageClass::Input) {
                 auto made = std::make_unique<LaneVariable>();
                 made->type = variable.type;
@@ -158,8 +168,10 @@ Component Emitter::descriptor(const Pointer& pointer) {
     llvm::Value* group = load_context(group_offset, pointer_type);
     Component index = pointer.descriptor_index;
     if (index && pointer.valid)
-        index = apply({pointer.valid, index}, [&](auto v) { return select(v[0], v[1], llvm::Constant::getAllOnesValue(v[1]->getType())); });
-    if (!index) return Component(at_offset(group, std::int64_t{slot->first} * static_cast<std::int64_t>(sizeof(Descriptor))));
+        index = apply({pointer.valid, index},
+                      [&](auto v) { return select(v[0], v[1], llvm::Constant::getAllOnesValue(v[1]->getType())); });
+    if (!index)
+        return Component(at_offset(group, std::int64_t{slot->first} * static_cast<std::int64_t>(sizeof(Descriptor))));
     // Indices out of range find a descriptor of nothing.
     auto*& nothing = shared_["nothing"];
     if (!nothing) {
@@ -176,11 +188,13 @@ Component Emitter::descriptor(const Pointer& pointer) {
     llvm::Value* first = at_offset(group, std::int64_t{slot->first} * static_cast<std::int64_t>(sizeof(Descriptor)));
     if (index.is_uniform()) {
         llvm::Value* wide = builder.CreateZExt(index.value, builder.getInt64Ty());
-        llvm::Value* address = builder.CreateGEP(builder.getInt8Ty(), first, builder.CreateMul(wide, int64(sizeof(Descriptor))));
+        llvm::Value* address =
+            builder.CreateGEP(builder.getInt8Ty(), first, builder.CreateMul(wide, int64(sizeof(Descriptor))));
         return Component(select(builder.CreateICmpULT(index.value, count), address, nothing));
     }
     llvm::Value* wide = builder.CreateZExt(index.value, vector_of(builder.getInt64Ty()));
-    llvm::Value* address = builder.CreateGEP(builder.getInt8Ty(), first, builder.CreateMul(wide, splat(int64(sizeof(Descriptor)))));
+    llvm::Value* address =
+        builder.CreateGEP(builder.getInt8Ty(), first, builder.CreateMul(wide, splat(int64(sizeof(Descriptor)))));
     return Component(select(builder.CreateICmpULT(index.value, splat(count)), address, splat(nothing)));
 }
 
@@ -197,10 +211,13 @@ Pointer Emitter::buffer_pointer(const Pointer& block) {
     } else {
         // A different buffer in each lane.
         const auto gather = [&](std::size_t offset, llvm::Type* kind) -> llvm::Value* {
-            llvm::Value* places = builder.CreateGEP(builder.getInt8Ty(), address.value, int64(static_cast<std::int64_t>(offset)));
-            return builder.CreateMaskedGather(vector_of(kind), places, llvm::Align(8), all_lanes(), llvm::Constant::getNullValue(vector_of(kind)));
+            llvm::Value* places =
+                builder.CreateGEP(builder.getInt8Ty(), address.value, int64(static_cast<std::int64_t>(offset)));
+            return builder.CreateMaskedGather(vector_of(kind), places, llvm::Align(8), all_lanes(),
+                                              llvm::Constant::getNullValue(vector_of(kind)));
         };
-        pointer.base = builder.CreateIntToPtr(gather(offsetof(Descriptor, data), builder.getInt64Ty()), vector_of(pointer_type));
+        pointer.base =
+            builder.CreateIntToPtr(gather(offsetof(Descriptor, data), builder.getInt64Ty()), vector_of(pointer_type));
         if (in_double())
             pointer.shadow = builder.CreateIntToPtr(gather(offsetof(Descriptor, shadow), builder.getInt64Ty()),
                                                     vector_of(pointer_type));
@@ -229,12 +246,14 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
             // Arrays of arrays: their elements lie one after another.
             std::int64_t inner = 1;
             bool is_innermost = true;
-            for (const Type* element = &module.type(type.element); element->kind == TypeKind::array; element = &module.type(element->element))
+            for (const Type* element = &module.type(type.element); element->kind == TypeKind::array;
+                 element = &module.type(element->element))
                 inner *= element->count, is_innermost = false;
             if (!is_innermost || pointer.descriptor_index)
                 if (type.kind == TypeKind::array)
                     pointer.valid = logical_and(pointer.valid, apply({index}, [&](auto v) {
-                                                    return builder.CreateICmpULT(v[0], llvm::ConstantInt::get(v[0]->getType(), type.count));
+                                                    return builder.CreateICmpULT(
+                                                        v[0], llvm::ConstantInt::get(v[0]->getType(), type.count));
                                                 }));
             pointer.descriptor_index = add(pointer.descriptor_index, multiply(index, inner));
             pointer.type = type.element;
@@ -274,7 +293,8 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
         const Type& column = module.type(type.element);
         const std::uint32_t scalar = module.type(column.element).bits / 8;
         std::uint32_t stride = pointer.matrix_stride;
-        if (pointer.storage == StorageClass::Workgroup || stride == 0) stride = column.count * scalar, pointer.row_major = false;
+        if (pointer.storage == StorageClass::Workgroup || stride == 0)
+            stride = column.count * scalar, pointer.row_major = false;
         step = pointer.row_major ? scalar : stride;
         pointer.component_stride = pointer.row_major ? stride : 0;
     } else {
@@ -303,7 +323,8 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
             llvm::Type* kind = like(v[0], builder.getInt32Ty());
             if (bits < 32) return is_signed ? builder.CreateSExt(v[0], kind) : builder.CreateZExt(v[0], kind);
             llvm::Value* fits = builder.CreateICmpULE(v[0], llvm::ConstantInt::get(v[0]->getType(), 0x7fffffff));
-            return builder.CreateSelect(fits, builder.CreateTrunc(v[0], kind), llvm::ConstantInt::get(kind, 0x7fffffff));
+            return builder.CreateSelect(fits, builder.CreateTrunc(v[0], kind),
+                                        llvm::ConstantInt::get(kind, 0x7fffffff));
         });
     }
     Component bound = int32(count);
@@ -314,7 +335,10 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
             llvm::Value* room = builder.CreateSelect(builder.CreateICmpUGE(v[0], begin), builder.CreateSub(v[0], begin),
                                                      llvm::Constant::getNullValue(v[0]->getType()));
             llvm::Type* kind = like(v[0], builder.getInt32Ty());
-            return builder.CreateTrunc(builder.CreateUDiv(room, llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(std::max<std::int64_t>(step, 1)))), kind);
+            return builder.CreateTrunc(
+                builder.CreateUDiv(room, llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(
+                                                                                     std::max<std::int64_t>(step, 1)))),
+                kind);
         });
     }
     if (options.checks) {
@@ -336,19 +360,23 @@ Pointer Emitter::access(Pointer pointer, Id index_id) {
 
 std::vector<Component> Emitter::components_of(const Pointer& pointer) {
     if (pointer.kind != Pointer::Kind::bytes) reject("only pointers into buffers and workgroup memory can be values");
-    const Component base = apply({pointer.base}, [&](auto v) { return builder.CreatePtrToInt(v[0], like(v[0], builder.getInt64Ty())); });
+    const Component base =
+        apply({pointer.base}, [&](auto v) { return builder.CreatePtrToInt(v[0], like(v[0], builder.getInt64Ty())); });
     Component limit = pointer.limit;
-    if (pointer.storage == StorageClass::Workgroup && !limit) limit = int64(static_cast<std::int64_t>(workgroup_variable_bytes));
+    if (pointer.storage == StorageClass::Workgroup && !limit)
+        limit = int64(static_cast<std::int64_t>(workgroup_variable_bytes));
     // Where an index was out of range the pointer leads to nothing.
     if (pointer.valid)
-        limit = apply({pointer.valid, limit}, [&](auto v) { return select(v[0], v[1], llvm::Constant::getNullValue(v[1]->getType())); });
+        limit = apply({pointer.valid, limit},
+                      [&](auto v) { return select(v[0], v[1], llvm::Constant::getNullValue(v[1]->getType())); });
     return {base, limit, add(pointer.dynamic_offset, Component(int32(pointer.offset)))};
 }
 
 Pointer Emitter::step(Pointer pointer, const Type& kind, Id index_id) {
     if (pointer.kind != Pointer::Kind::bytes) reject("only pointers into buffers and workgroup memory can be moved");
     const bool is_tight = pointer.storage == StorageClass::Workgroup || kind.array_stride == 0;
-    const std::int64_t stride = is_tight ? static_cast<std::int64_t>(module.tight_size(pointer.type)) : kind.array_stride;
+    const std::int64_t stride =
+        is_tight ? static_cast<std::int64_t>(module.tight_size(pointer.type)) : kind.array_stride;
     const bool is_signed = module.type(module.type_of(index_id)).is_signed;
     const Component steps = get_scalar(index_id);
     if (options.checks) check_undefined(std::span(&steps, 1), origin_of(index_id));
@@ -357,9 +385,11 @@ Pointer Emitter::step(Pointer pointer, const Type& kind, Id index_id) {
         return is_signed ? builder.CreateSExtOrTrunc(v[0], word) : builder.CreateZExtOrTrunc(v[0], word);
     });
     // Offsets may fall as well as rise: all of it counts against the limit.
-    pointer.dynamic_offset = add(add(pointer.dynamic_offset, Component(int32(pointer.offset))), multiply(index, stride));
+    pointer.dynamic_offset =
+        add(add(pointer.dynamic_offset, Component(int32(pointer.offset))), multiply(index, stride));
     pointer.offset = 0;
-    if (pointer.storage == StorageClass::Workgroup && !pointer.limit) pointer.limit = int64(static_cast<std::int64_t>(workgroup_variable_bytes));
+    if (pointer.storage == StorageClass::Workgroup && !pointer.limit)
+        pointer.limit = int64(static_cast<std::int64_t>(workgroup_variable_bytes));
     pointer.needs_limit_check = true;
     return pointer;
 }
@@ -419,9 +449,11 @@ Component Emitter::load_bytes(const Pointer& pointer, std::int64_t extra, const 
     }
     llvm::Value* lanes_on = ok ? both(mask, ok.value) : mask;
     llvm::Value* none = llvm::Constant::getNullValue(vector_of(kind));
-    if (pointer.base.is_uniform() && pointer.dynamic_offset.linear_base && pointer.dynamic_offset.linear_stride == std::int64_t{bytes}) {
-        llvm::Value* start = builder.CreateGEP(builder.getInt8Ty(), at_offset(pointer.base.value, pointer.offset + extra),
-                                               builder.CreateSExt(pointer.dynamic_offset.linear_base, builder.getInt64Ty()));
+    if (pointer.base.is_uniform() && pointer.dynamic_offset.linear_base &&
+        pointer.dynamic_offset.linear_stride == std::int64_t{bytes}) {
+        llvm::Value* start =
+            builder.CreateGEP(builder.getInt8Ty(), at_offset(pointer.base.value, pointer.offset + extra),
+                              builder.CreateSExt(pointer.dynamic_offset.linear_base, builder.getInt64Ty()));
         return finish(builder.CreateMaskedLoad(vector_of(kind), start, alignment, lanes_on, none));
     }
     return finish(builder.CreateMaskedGather(vector_of(kind), address, alignment, lanes_on, none));
@@ -446,8 +478,9 @@ void Emitter::store_bytes(const Pointer& pointer, std::int64_t extra, const Type
         // All lanes write to one place: the last of them wins.
         llvm::Value* last = stored.value;
         if (!stored.is_uniform()) {
-            llvm::Value* leading = builder.CreateIntrinsic(llvm::Intrinsic::ctlz, {builder.getInt32Ty()},
-                                                           {builder.CreateOr(mask_bits(lanes_on), int32(1)), builder.getTrue()});
+            llvm::Value* leading =
+                builder.CreateIntrinsic(llvm::Intrinsic::ctlz, {builder.getInt32Ty()},
+                                        {builder.CreateOr(mask_bits(lanes_on), int32(1)), builder.getTrue()});
             last = builder.CreateExtractElement(stored.value, builder.CreateSub(int32(31), leading));
         }
         llvm::AllocaInst*& nowhere = nowhere_slot;
@@ -456,9 +489,11 @@ void Emitter::store_bytes(const Pointer& pointer, std::int64_t extra, const Type
         return;
     }
     llvm::Value* values = widen(stored);
-    if (pointer.base.is_uniform() && pointer.dynamic_offset.linear_base && pointer.dynamic_offset.linear_stride == std::int64_t{bytes}) {
-        llvm::Value* start = builder.CreateGEP(builder.getInt8Ty(), at_offset(pointer.base.value, pointer.offset + extra),
-                                               builder.CreateSExt(pointer.dynamic_offset.linear_base, builder.getInt64Ty()));
+    if (pointer.base.is_uniform() && pointer.dynamic_offset.linear_base &&
+        pointer.dynamic_offset.linear_stride == std::int64_t{bytes}) {
+        llvm::Value* start =
+            builder.CreateGEP(builder.getInt8Ty(), at_offset(pointer.base.value, pointer.offset + extra),
+                              builder.CreateSExt(pointer.dynamic_offset.linear_base, builder.getInt64Ty()));
         builder.CreateMaskedStore(values, start, alignment, lanes_on);
         return;
     }
@@ -486,15 +521,18 @@ Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t ind
     if (!pointer.dynamic_component) {
         if (pointer.valid) {
             // A constant index out of range.
-            if (const auto* never = llvm::dyn_cast<llvm::Constant>(pointer.valid.value); never && never->isNullValue()) return zero(scalar);
+            if (const auto* never = llvm::dyn_cast<llvm::Constant>(pointer.valid.value); never && never->isNullValue())
+                return zero(scalar);
         }
         if (!variable.memory) return variable.components.at(number);
         const std::uint32_t per_lane = variable.is_uniform ? 1 : lanes;
         llvm::Value* address = at_offset(variable.memory, std::int64_t{number} * variable.slot_bytes * per_lane);
-        Component loaded = finish(builder.CreateAlignedLoad(variable.is_uniform ? kind : static_cast<llvm::Type*>(vector_of(kind)), address,
-                                                            llvm::Align(variable.slot_bytes)));
+        Component loaded =
+            finish(builder.CreateAlignedLoad(variable.is_uniform ? kind : static_cast<llvm::Type*>(vector_of(kind)),
+                                             address, llvm::Align(variable.slot_bytes)));
         if (pointer.valid)
-            loaded = apply({pointer.valid, loaded}, [&](auto v) { return select(v[0], v[1], llvm::Constant::getNullValue(v[1]->getType())); });
+            loaded = apply({pointer.valid, loaded},
+                           [&](auto v) { return select(v[0], v[1], llvm::Constant::getNullValue(v[1]->getType())); });
         return loaded;
     }
     if (!variable.memory) {
@@ -502,7 +540,9 @@ Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t ind
         LaneVariable spilled;
         const Type& type = module.type(variable.type);
         spilled.slot_bytes = slot_bytes_of(type);
-        spilled.memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * spilled.slot_bytes * lanes), "input");
+        spilled.memory = make_slot(
+            llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * spilled.slot_bytes * lanes),
+            "input");
         fill(spilled, variable.components);
         Pointer through = pointer;
         through.variable = &spilled;
@@ -511,8 +551,8 @@ Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t ind
         if (!std::ranges::any_of(variable.components, &Component::undefined)) return loaded;
         LaneVariable told;
         told.type = variable.type;
-        told.memory =
-            make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * 4 * lanes), "undefined");
+        told.memory = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), std::uint64_t{type.components} * 4 * lanes),
+                                "undefined");
         std::vector<Component> flags;
         for (const Component& component : variable.components)
             flags.emplace_back(component.undefined ? component.undefined : builder.getFalse());
@@ -525,11 +565,14 @@ Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t ind
     if (element.is_uniform() && (!pointer.valid || pointer.valid.is_uniform())) {
         llvm::Value* safe = pointer.valid ? select(pointer.valid.value, element.value, int32(0)) : element.value;
         const std::uint32_t per_lane = variable.is_uniform ? 1 : lanes;
-        llvm::Value* offset = builder.CreateMul(builder.CreateAdd(safe, int32(number)), int32(variable.slot_bytes * per_lane));
+        llvm::Value* offset =
+            builder.CreateMul(builder.CreateAdd(safe, int32(number)), int32(variable.slot_bytes * per_lane));
         // With the index forced to 0 the address may lie before the element, never outside of the variable.
-        llvm::Value* address = builder.CreateGEP(builder.getInt8Ty(), variable.memory, builder.CreateZExt(offset, builder.getInt64Ty()));
-        llvm::Value* value = builder.CreateAlignedLoad(variable.is_uniform ? kind : static_cast<llvm::Type*>(vector_of(kind)), address,
-                                                       llvm::Align(variable.slot_bytes));
+        llvm::Value* address =
+            builder.CreateGEP(builder.getInt8Ty(), variable.memory, builder.CreateZExt(offset, builder.getInt64Ty()));
+        llvm::Value* value =
+            builder.CreateAlignedLoad(variable.is_uniform ? kind : static_cast<llvm::Type*>(vector_of(kind)), address,
+                                      llvm::Align(variable.slot_bytes));
         if (pointer.valid) value = select(pointer.valid.value, value, llvm::Constant::getNullValue(value->getType()));
         return finish(value);
     }
@@ -542,7 +585,8 @@ Component Emitter::load_lane_component(const Pointer& pointer, std::uint32_t ind
                                              llvm::Constant::getNullValue(vector_of(kind))));
 }
 
-void Emitter::store_lane_component(const Pointer& pointer, std::uint32_t index, const Type& scalar, const Component& value) {
+void Emitter::store_lane_component(const Pointer& pointer, std::uint32_t index, const Type& scalar,
+                                   const Component& value) {
     LaneVariable& variable = *pointer.variable;
     if (!variable.memory) reject("an input is written");
     const std::uint32_t number = pointer.component + index;
@@ -566,14 +610,17 @@ void Emitter::store_lane_component(const Pointer& pointer, std::uint32_t index, 
     };
     if (!pointer.dynamic_component) {
         if (pointer.valid)
-            if (const auto* never = llvm::dyn_cast<llvm::Constant>(pointer.valid.value); never && never->isNullValue()) return;
-        put(at_offset(variable.memory, std::int64_t{number} * variable.slot_bytes * per_lane), pointer.valid ? pointer.valid.value : nullptr);
+            if (const auto* never = llvm::dyn_cast<llvm::Constant>(pointer.valid.value); never && never->isNullValue())
+                return;
+        put(at_offset(variable.memory, std::int64_t{number} * variable.slot_bytes * per_lane),
+            pointer.valid ? pointer.valid.value : nullptr);
         return;
     }
     const Component element = pointer.dynamic_component;
     if (element.is_uniform() && (!pointer.valid || pointer.valid.is_uniform())) {
         llvm::Value* safe = pointer.valid ? select(pointer.valid.value, element.value, int32(0)) : element.value;
-        llvm::Value* offset = builder.CreateMul(builder.CreateAdd(safe, int32(number)), int32(variable.slot_bytes * per_lane));
+        llvm::Value* offset =
+            builder.CreateMul(builder.CreateAdd(safe, int32(number)), int32(variable.slot_bytes * per_lane));
         put(builder.CreateGEP(builder.getInt8Ty(), variable.memory, builder.CreateZExt(offset, builder.getInt64Ty())),
             pointer.valid ? pointer.valid.value : nullptr);
         return;
@@ -594,7 +641,9 @@ void Emitter::visit_layout(const Pointer& pointer, Id type_id, std::int64_t extr
         case TypeKind::boolean: case TypeKind::integer: case TypeKind::floating: visit(pointer, extra, type); return;
         case TypeKind::vector: {
             const Type& scalar = module.type(type.element);
-            const std::int64_t step = pointer.component_stride ? pointer.component_stride : scalar.kind == TypeKind::boolean ? 4 : scalar.bits / 8;
+            const std::int64_t step = pointer.component_stride           ? pointer.component_stride
+                                      : scalar.kind == TypeKind::boolean ? 4
+                                                                         : scalar.bits / 8;
             for (std::uint32_t i = 0; i < type.count; ++i) visit(pointer, extra + i * step, scalar);
             return;
         }
@@ -611,7 +660,9 @@ void Emitter::visit_layout(const Pointer& pointer, Id type_id, std::int64_t extr
             return;
         }
         case TypeKind::array: {
-            const std::int64_t step = is_tight || type.array_stride == 0 ? static_cast<std::int64_t>(module.tight_size(type.element)) : type.array_stride;
+            const std::int64_t step = is_tight || type.array_stride == 0
+                                          ? static_cast<std::int64_t>(module.tight_size(type.element))
+                                          : type.array_stride;
             for (std::uint32_t i = 0; i < type.count; ++i) visit_layout(pointer, type.element, extra + i * step, visit);
             return;
         }
@@ -619,8 +670,12 @@ void Emitter::visit_layout(const Pointer& pointer, Id type_id, std::int64_t extr
             for (std::uint32_t i = 0; i < type.members.size(); ++i) {
                 const Member& member = type.members[i];
                 Pointer inner = pointer;
-                inner.row_major = member.row_major, inner.matrix_stride = member.matrix_stride, inner.component_stride = 0;
-                visit_layout(inner, member.type, extra + (is_tight ? static_cast<std::int64_t>(module.tight_offset(type_id, i)) : member.offset), visit);
+                inner.row_major = member.row_major, inner.matrix_stride = member.matrix_stride,
+                inner.component_stride = 0;
+                visit_layout(
+                    inner, member.type,
+                    extra + (is_tight ? static_cast<std::int64_t>(module.tight_offset(type_id, i)) : member.offset),
+                    visit);
             }
             return;
         default: reject("a value of a type without size lies in memory");
@@ -689,7 +744,8 @@ llvm::Value* Emitter::zeros() {
     auto*& made = shared_["zeros"];
     if (!made) {
         auto* type = llvm::ArrayType::get(builder.getInt64Ty(), 1);
-        made = new llvm::GlobalVariable(target, type, true, llvm::GlobalValue::InternalLinkage, llvm::Constant::getNullValue(type), "zeros");
+        made = new llvm::GlobalVariable(target, type, true, llvm::GlobalValue::InternalLinkage,
+                                        llvm::Constant::getNullValue(type), "zeros");
     }
     return made;
 }
@@ -701,18 +757,21 @@ void Emitter::declare_variables() {
             workgroup_variable_bytes += (module.tight_size(variable.type) + 15) / 16 * 16;
         }
     if (workgroup_variable_bytes > most_workgroup_bytes)
-        reject(fmt::format("the variables of a workgroup take {} bytes; {} are the most", workgroup_variable_bytes, most_workgroup_bytes));
+        reject(fmt::format("the variables of a workgroup take {} bytes; {} are the most", workgroup_variable_bytes,
+                           most_workgroup_bytes));
     if (in_double()) {
         workgroup_shadow_offset = static_cast<std::int64_t>(workgroup_variable_bytes);
         workgroup_variable_bytes *= 3;
     }
     // Inputs are made here, where everything that follows can see them.
     for (const Id id : module.interface())
-        if (const Variable* variable = module.variable(id); variable && variable->storage == StorageClass::Input) pointer_to(id);
+        if (const Variable* variable = module.variable(id); variable && variable->storage == StorageClass::Input)
+            pointer_to(id);
     // Content of variables starts as the initializer says, or as zero: undefined would do, but not in every lane alike.
     for (const auto& [id, variable] : module.variables()) {
         if (variable.storage != StorageClass::Private && variable.storage != StorageClass::Output) continue;
-        if (variable.storage == StorageClass::Output && std::ranges::find(module.interface(), id) == module.interface().end())
+        if (variable.storage == StorageClass::Output &&
+            std::ranges::find(module.interface(), id) == module.interface().end())
             continue;  // Of another entry point.
         if (is_ray_query(variable.type)) {
             clear_ray_query(id);
@@ -723,7 +782,8 @@ void Emitter::declare_variables() {
         std::vector<Component> initial;
         if (variable.initializer) initial = get_components(variable.initializer);
         else if (module.type(variable.type).components <= most_direct_components)
-            for_each_component_type(variable.type, [&](const Type& scalar) { initial.push_back(undefined_value(scalar)); });
+            for_each_component_type(variable.type,
+                                    [&](const Type& scalar) { initial.push_back(undefined_value(scalar)); });
         fill(made, initial);
         if (made.undefined) mark_undefined(made, !variable.initializer);
     }
@@ -746,7 +806,8 @@ bool Emitter::emit_memory(const Instruction& at) {
             } else if (const Type& type = module.type(variable.type); type.components <= 64) {
                 // In loops and repeated calls: not what an earlier round left there.
                 std::vector<Component> initial;
-                for_each_component_type(variable.type, [&](const Type& scalar) { initial.push_back(undefined_value(scalar)); });
+                for_each_component_type(variable.type,
+                                        [&](const Type& scalar) { initial.push_back(undefined_value(scalar)); });
                 if (!follows_undefined() || frame->function == &module.entry()) fill(variable, initial);
             }
             if (!at.operand(1) && variable.undefined) mark_undefined(variable);
@@ -793,13 +854,16 @@ bool Emitter::emit_memory(const Instruction& at) {
                 });
             };
             const Type& kind = module.type(module.type_of(at.operand(0)));
-            const std::int64_t stride = std::max<std::int64_t>(1, kind.array_stride && kind.storage != StorageClass::Workgroup
-                                                                      ? std::int64_t{kind.array_stride}
-                                                                      : static_cast<std::int64_t>(module.tight_size(kind.element)));
+            const std::int64_t stride =
+                std::max<std::int64_t>(1, kind.array_stride && kind.storage != StorageClass::Workgroup
+                                              ? std::int64_t{kind.array_stride}
+                                              : static_cast<std::int64_t>(module.tight_size(kind.element)));
             set(at, {apply({address(at.operand(0)), address(at.operand(1))}, [&](auto v) -> llvm::Value* {
                     if (at.op != Op::OpPtrDiff)
-                        return builder.CreateICmp(at.op == Op::OpPtrEqual ? llvm::CmpInst::ICMP_EQ : llvm::CmpInst::ICMP_NE, v[0], v[1]);
-                    llvm::Value* elements = builder.CreateSDiv(builder.CreateSub(v[0], v[1]), llvm::ConstantInt::getSigned(v[0]->getType(), stride));
+                        return builder.CreateICmp(
+                            at.op == Op::OpPtrEqual ? llvm::CmpInst::ICMP_EQ : llvm::CmpInst::ICMP_NE, v[0], v[1]);
+                    llvm::Value* elements = builder.CreateSDiv(builder.CreateSub(v[0], v[1]),
+                                                               llvm::ConstantInt::getSigned(v[0]->getType(), stride));
                     return builder.CreateSExtOrTrunc(elements, like(v[0], scalar_type(module.type(at.type))));
                 })});
             return true;
@@ -813,7 +877,8 @@ bool Emitter::emit_memory(const Instruction& at) {
         }
         case Op::OpCopyMemory: {
             const Pointer from = get_pointer(at.operand(1));
-            if (module.type(from.type).components > Module::max_components) reject("a copy of too many scalars; copy a part");
+            if (module.type(from.type).components > Module::max_components)
+                reject("a copy of too many scalars; copy a part");
             store(get_pointer(at.operand(0)), load(from));
             return true;
         }
@@ -826,10 +891,12 @@ bool Emitter::emit_memory(const Instruction& at) {
             const std::int64_t begin = block.offset + member.offset;
             const Component moved = block.dynamic_offset ? block.dynamic_offset : Component(int32(0));
             set(at, {apply({block.limit, moved}, [&](auto v) {
-                    llvm::Value* first = builder.CreateAdd(builder.CreateZExt(v[1], v[0]->getType()),
-                                                           llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(begin)));
-                    llvm::Value* room = builder.CreateSelect(builder.CreateICmpUGE(v[0], first), builder.CreateSub(v[0], first),
-                                                             llvm::Constant::getNullValue(v[0]->getType()));
+                    llvm::Value* first =
+                        builder.CreateAdd(builder.CreateZExt(v[1], v[0]->getType()),
+                                          llvm::ConstantInt::get(v[0]->getType(), static_cast<std::uint64_t>(begin)));
+                    llvm::Value* room =
+                        builder.CreateSelect(builder.CreateICmpUGE(v[0], first), builder.CreateSub(v[0], first),
+                                             llvm::Constant::getNullValue(v[0]->getType()));
                     llvm::Value* count = builder.CreateUDiv(room, llvm::ConstantInt::get(v[0]->getType(), stride));
                     return builder.CreateTrunc(count, like(v[0], builder.getInt32Ty()));
                 })});

@@ -21,7 +21,8 @@ std::array<std::size_t, 3> rows(std::size_t first) { return {first, first + row_
 bool is_committed_getter(Op op) {
     switch (op) {
         case Op::OpRayQueryGetIntersectionTKHR: case Op::OpRayQueryGetIntersectionInstanceCustomIndexKHR:
-        case Op::OpRayQueryGetIntersectionInstanceIdKHR: case Op::OpRayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetKHR:
+        case Op::OpRayQueryGetIntersectionInstanceIdKHR:
+        case Op::OpRayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetKHR:
         case Op::OpRayQueryGetIntersectionGeometryIndexKHR: case Op::OpRayQueryGetIntersectionPrimitiveIndexKHR:
         case Op::OpRayQueryGetIntersectionBarycentricsKHR: case Op::OpRayQueryGetIntersectionFrontFaceKHR:
         case Op::OpRayQueryGetIntersectionObjectRayDirectionKHR: case Op::OpRayQueryGetIntersectionObjectRayOriginKHR:
@@ -83,8 +84,9 @@ void Emitter::clear_ray_query(Id id) {
     const std::uint64_t bytes = module.tight_size(pointer.type);
     // All that must not be what lay there before: without a status no other member is looked at.
     for (std::uint64_t at = 0; at < bytes; at += sizeof(RayQueryLanes))
-        builder.CreateMemSet(at_offset(pointer.base.value, static_cast<std::int64_t>(at + offsetof(RayQueryLanes, status))),
-                             builder.getInt8(0), row_bytes, llvm::MaybeAlign(64));
+        builder.CreateMemSet(
+            at_offset(pointer.base.value, static_cast<std::int64_t>(at + offsetof(RayQueryLanes, status))),
+            builder.getInt8(0), row_bytes, llvm::MaybeAlign(64));
 }
 
 void Emitter::for_each_query(Id pointer_id, const std::function<void(llvm::Value*, llvm::Value*)>& body) {
@@ -92,7 +94,8 @@ void Emitter::for_each_query(Id pointer_id, const std::function<void(llvm::Value
     if (!value.pointer || module.type(value.pointer->type).kind != TypeKind::ray_query)
         reject("a ray query is used that is no variable");
     const Pointer& pointer = *value.pointer;
-    for_each_different(Component(addresses(pointer, 0)), both(mask, pointer.valid ? pointer.valid.value : nullptr), body);
+    for_each_different(Component(addresses(pointer, 0)), both(mask, pointer.valid ? pointer.valid.value : nullptr),
+                       body);
 }
 
 std::vector<Component> Emitter::read_query(Id pointer, std::span<const std::size_t> offsets, llvm::Type* scalar) {
@@ -103,8 +106,8 @@ std::vector<Component> Emitter::read_query(Id pointer, std::span<const std::size
     }
     for_each_query(pointer, [&](llvm::Value* query, llvm::Value* lanes_on) {
         for (std::size_t i = 0; i < offsets.size(); ++i) {
-            llvm::Value* row = builder.CreateAlignedLoad(vector_of(scalar), at_offset(query, static_cast<std::int64_t>(offsets[i])),
-                                                         llvm::Align(64));
+            llvm::Value* row = builder.CreateAlignedLoad(
+                vector_of(scalar), at_offset(query, static_cast<std::int64_t>(offsets[i])), llvm::Align(64));
             if (!is_all(lanes_on)) row = select(lanes_on, row, builder.CreateLoad(vector_of(scalar), slots_of[i]));
             builder.CreateStore(row, slots_of[i]);
         }
@@ -116,10 +119,12 @@ std::vector<Component> Emitter::read_query(Id pointer, std::span<const std::size
     return values;
 }
 
-std::vector<Component> Emitter::ray_property(Id pointer, std::uint32_t property, std::uint32_t words, llvm::Type* scalar) {
+std::vector<Component> Emitter::ray_property(Id pointer, std::uint32_t property, std::uint32_t words,
+                                             llvm::Type* scalar) {
     llvm::FunctionCallee function = external("nacre_cpu_ray_property", builder.getVoidTy(),
                                              {pointer_type, builder.getInt32Ty(), builder.getInt32Ty(), pointer_type});
-    llvm::AllocaInst* result = make_slot(llvm::ArrayType::get(builder.getInt8Ty(), row_bytes * most_property_words), "property");
+    llvm::AllocaInst* result =
+        make_slot(llvm::ArrayType::get(builder.getInt8Ty(), row_bytes * most_property_words), "property");
     std::vector<llvm::AllocaInst*> slots_of;
     for (std::uint32_t i = 0; i < words; ++i) {
         slots_of.push_back(make_slot(vector_of(scalar), "of_hit"));
@@ -128,8 +133,8 @@ std::vector<Component> Emitter::ray_property(Id pointer, std::uint32_t property,
     for_each_query(pointer, [&](llvm::Value* query, llvm::Value* lanes_on) {
         builder.CreateCall(function, {query, int32(property), mask_bits(lanes_on), result});
         for (std::uint32_t i = 0; i < words; ++i) {
-            llvm::Value* row = builder.CreateAlignedLoad(vector_of(scalar), at_offset(result, static_cast<std::int64_t>(i * row_bytes)),
-                                                         llvm::Align(64));
+            llvm::Value* row = builder.CreateAlignedLoad(
+                vector_of(scalar), at_offset(result, static_cast<std::int64_t>(i * row_bytes)), llvm::Align(64));
             builder.CreateStore(select(lanes_on, row, builder.CreateLoad(vector_of(scalar), slots_of[i])), slots_of[i]);
         }
     });
@@ -277,7 +282,8 @@ bool Emitter::emit_ray(const Instruction& at) {
     llvm::Type* real = builder.getFloatTy();
     const auto put = [&](llvm::Value* query, llvm::Value* lanes_on, std::size_t offset, llvm::Value* values) {
         llvm::Value* address = at_offset(query, static_cast<std::int64_t>(offset));
-        if (!is_all(lanes_on)) values = select(lanes_on, values, builder.CreateAlignedLoad(values->getType(), address, llvm::Align(64)));
+        if (!is_all(lanes_on))
+            values = select(lanes_on, values, builder.CreateAlignedLoad(values->getType(), address, llvm::Align(64)));
         builder.CreateAlignedStore(values, address, llvm::Align(64));
     };
     const auto is_committed = [&] { return module.constant_word(at.operand(1)).value_or(1) != 0; };
@@ -287,7 +293,9 @@ bool Emitter::emit_ray(const Instruction& at) {
         return true;
     };
     const auto get_property = [&](RayProperty property, std::uint32_t words, llvm::Type* scalar) {
-        set(at, ray_property(at.operand(0), static_cast<std::uint32_t>(property) | (is_committed() ? ray_property_committed : 0), words, scalar));
+        set(at, ray_property(at.operand(0),
+                             static_cast<std::uint32_t>(property) | (is_committed() ? ray_property_committed : 0),
+                             words, scalar));
         return true;
     };
     const auto candidate_kind = [&] {
@@ -300,12 +308,15 @@ bool Emitter::emit_ray(const Instruction& at) {
             if (!descriptor_address) reject("an acceleration structure that is no bound resource is not supported");
             llvm::Value* scenes = nullptr;
             if (descriptor_address.is_uniform()) {
-                scenes = splat(invariant_load(pointer_type, at_offset(descriptor_address.value, offsetof(Descriptor, data)), 8));
+                scenes = splat(
+                    invariant_load(pointer_type, at_offset(descriptor_address.value, offsetof(Descriptor, data)), 8));
             } else {
-                llvm::Value* places = builder.CreateGEP(builder.getInt8Ty(), descriptor_address.value, int64(offsetof(Descriptor, data)));
+                llvm::Value* places =
+                    builder.CreateGEP(builder.getInt8Ty(), descriptor_address.value, int64(offsetof(Descriptor, data)));
                 llvm::Type* wide = vector_of(builder.getInt64Ty());
                 scenes = builder.CreateIntToPtr(
-                    builder.CreateMaskedGather(wide, places, llvm::Align(8), mask, llvm::Constant::getNullValue(wide)), vector_of(pointer_type));
+                    builder.CreateMaskedGather(wide, places, llvm::Align(8), mask, llvm::Constant::getNullValue(wide)),
+                    vector_of(pointer_type));
             }
             const Component flags = get_scalar(at.operand(2)), cull_mask = get_scalar(at.operand(3));
             note_narrowed("ray");
@@ -348,7 +359,8 @@ bool Emitter::emit_ray(const Instruction& at) {
             });
             return true;
         case Op::OpRayQueryConfirmIntersectionKHR: {
-            llvm::FunctionCallee function = external("nacre_cpu_ray_confirm", builder.getVoidTy(), {pointer_type, word});
+            llvm::FunctionCallee function =
+                external("nacre_cpu_ray_confirm", builder.getVoidTy(), {pointer_type, word});
             for_each_query(at.operand(0), [&](llvm::Value* query, llvm::Value* lanes_on) {
                 builder.CreateCall(function, {query, mask_bits(lanes_on)});
             });
@@ -374,8 +386,9 @@ bool Emitter::emit_ray(const Instruction& at) {
                                                      offsetof(RayQueryLanes, status)};
             const std::vector<Component> found = read_query(at.operand(0), offsets, word);
             llvm::Value* zero_row = llvm::Constant::getNullValue(vector_of(word));
-            llvm::Value* is_hit = builder.CreateAnd(builder.CreateICmpNE(found[0].value, llvm::Constant::getAllOnesValue(vector_of(word))),
-                                                    builder.CreateICmpNE(found[2].value, zero_row));
+            llvm::Value* is_hit = builder.CreateAnd(
+                builder.CreateICmpNE(found[0].value, llvm::Constant::getAllOnesValue(vector_of(word))),
+                builder.CreateICmpNE(found[2].value, zero_row));
             set(at, {Component(builder.CreateSelect(is_hit, found[1].value, zero_row))});
             return true;
         }
@@ -394,7 +407,8 @@ bool Emitter::emit_ray(const Instruction& at) {
             set(at, read_query(at.operand(0), offsets, real));
             return true;
         }
-        case Op::OpRayQueryGetIntersectionInstanceCustomIndexKHR: return get_property(RayProperty::custom_index, 1, word);
+        case Op::OpRayQueryGetIntersectionInstanceCustomIndexKHR:
+            return get_property(RayProperty::custom_index, 1, word);
         case Op::OpRayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetKHR:
             return get_property(RayProperty::table_offset, 1, word);
         case Op::OpRayQueryGetIntersectionFrontFaceKHR: {
@@ -405,7 +419,8 @@ bool Emitter::emit_ray(const Instruction& at) {
             return true;
         }
         case Op::OpRayQueryGetIntersectionObjectRayOriginKHR: return get_property(RayProperty::object_origin, 3, real);
-        case Op::OpRayQueryGetIntersectionObjectRayDirectionKHR: return get_property(RayProperty::object_direction, 3, real);
+        case Op::OpRayQueryGetIntersectionObjectRayDirectionKHR:
+            return get_property(RayProperty::object_direction, 3, real);
         case Op::OpRayQueryGetIntersectionObjectToWorldKHR: return get_property(RayProperty::object_to_world, 12, real);
         case Op::OpRayQueryGetIntersectionWorldToObjectKHR: return get_property(RayProperty::world_to_object, 12, real);
         case Op::OpRayQueryGetIntersectionCandidateAABBOpaqueKHR:

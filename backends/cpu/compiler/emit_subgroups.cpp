@@ -42,7 +42,10 @@ std::optional<std::vector<Component>> Emitter::subgroup_input(spv::BuiltIn built
     switch (builtin) {
         case BuiltIn::SubgroupSize: return {{Component(int32(lanes))}};
         case BuiltIn::SubgroupLocalInvocationId: return {{linear(int32(0), 1)}};
-        case BuiltIn::SubgroupEqMask: case BuiltIn::SubgroupGeMask: case BuiltIn::SubgroupGtMask: case BuiltIn::SubgroupLeMask:
+        case BuiltIn::SubgroupEqMask:
+        case BuiltIn::SubgroupGeMask:
+        case BuiltIn::SubgroupGtMask:
+        case BuiltIn::SubgroupLeMask:
         case BuiltIn::SubgroupLtMask: {
             const std::uint32_t used = (1u << lanes) - 1;
             std::vector<std::uint32_t> words(lanes);
@@ -54,7 +57,8 @@ std::optional<std::vector<Component>> Emitter::subgroup_input(spv::BuiltIn built
                            : builtin == BuiltIn::SubgroupLeMask ? below | equal
                                                                 : below;
             }
-            return {{Component(llvm::ConstantDataVector::get(context, words)), Component(int32(0)), Component(int32(0)), Component(int32(0))}};
+            return {{Component(llvm::ConstantDataVector::get(context, words)), Component(int32(0)), Component(int32(0)),
+                     Component(int32(0))}};
         }
         default: return std::nullopt;
     }
@@ -75,14 +79,16 @@ bool Emitter::emit_subgroup(const Instruction& at) {
     const auto lane_of = [&](Id id) {
         const Component lane = get_scalar(id);
         if (follows_undefined()) check_undefined(std::span(&lane, 1), origin_of(id));
-        if (!lane.value->getType()->getScalarType()->isIntegerTy() || lane.value->getType()->getScalarType()->isIntegerTy(1))
+        if (!lane.value->getType()->getScalarType()->isIntegerTy() ||
+            lane.value->getType()->getScalarType()->isIntegerTy(1))
             reject("the number of an invocation is no integer");
         return lane;
     };
     const auto operand_value = [&](std::size_t i) { return get(at.operand(i)); };
     // A ballot is four words; only the first has lanes.
     const auto ballot = [&](llvm::Value* lanes_on) {
-        return std::vector<Component>{Component(mask_bits(lanes_on)), Component(int32(0)), Component(int32(0)), Component(int32(0))};
+        return std::vector<Component>{Component(mask_bits(lanes_on)), Component(int32(0)), Component(int32(0)),
+                                      Component(int32(0))};
     };
     const auto condition_mask = [&](const Component& condition) { return both(mask, condition.value); };
     const auto lane_bit = [&](llvm::Value* word) {  // i1 of each lane from a scalar word of bits.
@@ -90,7 +96,8 @@ bool Emitter::emit_subgroup(const Instruction& at) {
     };
     const auto one_lane = [&](const Component& value, llvm::Value* lane) -> Component {
         if (value.is_uniform()) return value;
-        llvm::Value* inside = builder.CreateAnd(builder.CreateZExtOrTrunc(lane, builder.getInt32Ty()), int32(lanes - 1));
+        llvm::Value* inside =
+            builder.CreateAnd(builder.CreateZExtOrTrunc(lane, builder.getInt32Ty()), int32(lanes - 1));
         return Component(builder.CreateExtractElement(value.value, inside));
     };
 
@@ -183,8 +190,11 @@ bool Emitter::emit_subgroup(const Instruction& at) {
         case Op::OpGroupNonUniformBallotBitExtract: {
             const Component word = ballot_of(at.operand(1)), index = lane_of(at.operand(2));
             set(at, {apply({word, index}, [&](auto v) {
-                    llvm::Value* shifted = builder.CreateLShr(v[0], builder.CreateAnd(v[1], llvm::ConstantInt::get(v[1]->getType(), 31)));
-                    return builder.CreateTrunc(shifted, v[0]->getType()->isVectorTy() ? static_cast<llvm::Type*>(mask_type) : builder.getInt1Ty());
+                    llvm::Value* shifted =
+                        builder.CreateLShr(v[0], builder.CreateAnd(v[1], llvm::ConstantInt::get(v[1]->getType(), 31)));
+                    return builder.CreateTrunc(shifted, v[0]->getType()->isVectorTy()
+                                                            ? static_cast<llvm::Type*>(mask_type)
+                                                            : builder.getInt1Ty());
                 })});
             return true;
         }
@@ -211,7 +221,9 @@ bool Emitter::emit_subgroup(const Instruction& at) {
             return true;
         }
         case Op::OpGroupNonUniformShuffle: case Op::OpGroupNonUniformShuffleXor: case Op::OpGroupNonUniformShuffleUp:
-        case Op::OpGroupNonUniformShuffleDown: case Op::OpGroupNonUniformQuadBroadcast: case Op::OpGroupNonUniformQuadSwap:
+        case Op::OpGroupNonUniformShuffleDown:
+        case Op::OpGroupNonUniformQuadBroadcast:
+        case Op::OpGroupNonUniformQuadSwap:
         case Op::OpGroupNonUniformRotateKHR: {
             llvm::Value* operand = nullptr;
             if (at.op != Op::OpGroupNonUniformQuadSwap || !module.constant_word(at.operand(2)))
@@ -226,24 +238,28 @@ bool Emitter::emit_subgroup(const Instruction& at) {
                 case Op::OpGroupNonUniformShuffleDown: source = builder.CreateAdd(numbers, operand); break;
                 case Op::OpGroupNonUniformRotateKHR: {
                     // Round the subgroup, or each cluster of it.
-                    const std::uint32_t cluster = std::min(lanes, std::max(1u, module.constant_word(at.operand(3)).value_or(lanes)));
+                    const std::uint32_t cluster =
+                        std::min(lanes, std::max(1u, module.constant_word(at.operand(3)).value_or(lanes)));
                     llvm::Value* inside = splat(int32(cluster - 1));
                     source = builder.CreateOr(builder.CreateAnd(numbers, builder.CreateNot(inside)),
                                               builder.CreateAnd(builder.CreateAdd(numbers, operand), inside));
                     break;
                 }
                 case Op::OpGroupNonUniformQuadBroadcast:
-                    source = builder.CreateOr(builder.CreateAnd(numbers, splat(int32(~3))), builder.CreateAnd(operand, splat(int32(3))));
+                    source = builder.CreateOr(builder.CreateAnd(numbers, splat(int32(~3))),
+                                              builder.CreateAnd(operand, splat(int32(3))));
                     break;
                 case Op::OpGroupNonUniformQuadSwap:
                     // Horizontal 0, vertical 1, diagonal 2: the lane number with bit 0, bit 1 or both turned over.
-                    source = builder.CreateXor(numbers, builder.CreateAnd(builder.CreateAdd(operand, splat(int32(1))), splat(int32(3))));
+                    source = builder.CreateXor(
+                        numbers, builder.CreateAnd(builder.CreateAdd(operand, splat(int32(1))), splat(int32(3))));
                     break;
                 default: break;
             }
             std::vector<Component> made;
             for (const Component& component : operand_value(1).components) {
-                made.push_back(component.is_uniform() ? Component(widen(component)) : Component(permute(component.value, source)));
+                made.push_back(component.is_uniform() ? Component(widen(component))
+                                                      : Component(permute(component.value, source)));
                 if (llvm::Value* undefined = undefined_in(component))
                     made.back().undefined = permute(undefined, source);
             }
@@ -254,35 +270,58 @@ bool Emitter::emit_subgroup(const Instruction& at) {
     }
 
     // Reductions and scans.
-    const Type& scalar = module.has_type(at.type) && module.type(at.type).components > 0 ? module.type(component_type(at.type, 0)) : Type{};
+    const Type& scalar = module.has_type(at.type) && module.type(at.type).components > 0
+                             ? module.type(component_type(at.type, 0))
+                             : Type{};
     Combination how;
     llvm::Type* kind = scalar.is_scalar() && scalar.bits ? scalar_type(scalar) : nullptr;
     const auto integer = [&](std::uint64_t value) { return llvm::ConstantInt::get(kind, value); };
     if (at.op >= Op::OpGroupNonUniformIAdd && at.op <= Op::OpGroupNonUniformLogicalXor) {
-        const TypeKind wanted = at.op == Op::OpGroupNonUniformFAdd || at.op == Op::OpGroupNonUniformFMul || at.op == Op::OpGroupNonUniformFMin ||
-                                        at.op == Op::OpGroupNonUniformFMax
+        const TypeKind wanted = at.op == Op::OpGroupNonUniformFAdd || at.op == Op::OpGroupNonUniformFMul ||
+                                        at.op == Op::OpGroupNonUniformFMin || at.op == Op::OpGroupNonUniformFMax
                                     ? TypeKind::floating
                                 : at.op >= Op::OpGroupNonUniformLogicalAnd ? TypeKind::boolean
                                                                            : TypeKind::integer;
         if (!kind || scalar.kind != wanted) reject("what is combined is not of the kind that the instruction takes");
     }
     switch (at.op) {
-        case Op::OpGroupNonUniformIAdd: how = {[&](auto* a, auto* b) { return builder.CreateAdd(a, b); }, integer(0)}; break;
-        case Op::OpGroupNonUniformFAdd: how = {[&](auto* a, auto* b) { return builder.CreateFAdd(a, b); }, llvm::ConstantFP::get(kind, -0.0)}; break;
-        case Op::OpGroupNonUniformIMul: how = {[&](auto* a, auto* b) { return builder.CreateMul(a, b); }, integer(1)}; break;
-        case Op::OpGroupNonUniformFMul: how = {[&](auto* a, auto* b) { return builder.CreateFMul(a, b); }, llvm::ConstantFP::get(kind, 1.0)}; break;
-        case Op::OpGroupNonUniformSMin: how = {[&](auto* a, auto* b) { return math.s_min(a, b); }, integer((std::uint64_t{1} << (scalar.bits - 1)) - 1)}; break;
-        case Op::OpGroupNonUniformUMin: how = {[&](auto* a, auto* b) { return math.u_min(a, b); }, integer(~std::uint64_t{0})}; break;
-        case Op::OpGroupNonUniformFMin: how = {[&](auto* a, auto* b) { return math.n_min(a, b); }, llvm::ConstantFP::getInfinity(kind)}; break;
-        case Op::OpGroupNonUniformSMax: how = {[&](auto* a, auto* b) { return math.s_max(a, b); }, integer(std::uint64_t{1} << (scalar.bits - 1))}; break;
+        case Op::OpGroupNonUniformIAdd:
+            how = {[&](auto* a, auto* b) { return builder.CreateAdd(a, b); }, integer(0)};
+            break;
+        case Op::OpGroupNonUniformFAdd:
+            how = {[&](auto* a, auto* b) { return builder.CreateFAdd(a, b); }, llvm::ConstantFP::get(kind, -0.0)};
+            break;
+        case Op::OpGroupNonUniformIMul:
+            how = {[&](auto* a, auto* b) { return builder.CreateMul(a, b); }, integer(1)};
+            break;
+        case Op::OpGroupNonUniformFMul:
+            how = {[&](auto* a, auto* b) { return builder.CreateFMul(a, b); }, llvm::ConstantFP::get(kind, 1.0)};
+            break;
+        case Op::OpGroupNonUniformSMin:
+            how = {[&](auto* a, auto* b) { return math.s_min(a, b); },
+                   integer((std::uint64_t{1} << (scalar.bits - 1)) - 1)};
+            break;
+        case Op::OpGroupNonUniformUMin:
+            how = {[&](auto* a, auto* b) { return math.u_min(a, b); }, integer(~std::uint64_t{0})};
+            break;
+        case Op::OpGroupNonUniformFMin:
+            how = {[&](auto* a, auto* b) { return math.n_min(a, b); }, llvm::ConstantFP::getInfinity(kind)};
+            break;
+        case Op::OpGroupNonUniformSMax:
+            how = {[&](auto* a, auto* b) { return math.s_max(a, b); }, integer(std::uint64_t{1} << (scalar.bits - 1))};
+            break;
         case Op::OpGroupNonUniformUMax: how = {[&](auto* a, auto* b) { return math.u_max(a, b); }, integer(0)}; break;
-        case Op::OpGroupNonUniformFMax: how = {[&](auto* a, auto* b) { return math.n_max(a, b); }, llvm::ConstantFP::getInfinity(kind, true)}; break;
+        case Op::OpGroupNonUniformFMax:
+            how = {[&](auto* a, auto* b) { return math.n_max(a, b); }, llvm::ConstantFP::getInfinity(kind, true)};
+            break;
         case Op::OpGroupNonUniformBitwiseAnd: case Op::OpGroupNonUniformLogicalAnd:
-            how = {[&](auto* a, auto* b) { return builder.CreateAnd(a, b); }, llvm::Constant::getAllOnesValue(kind)}; break;
+            how = {[&](auto* a, auto* b) { return builder.CreateAnd(a, b); }, llvm::Constant::getAllOnesValue(kind)};
+            break;
         case Op::OpGroupNonUniformBitwiseOr: case Op::OpGroupNonUniformLogicalOr:
             how = {[&](auto* a, auto* b) { return builder.CreateOr(a, b); }, llvm::Constant::getNullValue(kind)}; break;
         case Op::OpGroupNonUniformBitwiseXor: case Op::OpGroupNonUniformLogicalXor:
-            how = {[&](auto* a, auto* b) { return builder.CreateXor(a, b); }, llvm::Constant::getNullValue(kind)}; break;
+            how = {[&](auto* a, auto* b) { return builder.CreateXor(a, b); }, llvm::Constant::getNullValue(kind)};
+            break;
         default: return false;
     }
     if (module.type_of(at.operand(2)) != at.type) reject("what is combined is not of the type of the result");
@@ -301,7 +340,9 @@ bool Emitter::emit_subgroup(const Instruction& at) {
             llvm::SmallVector<int, 16> source(lanes);
             for (std::uint32_t i = 0; i < lanes; ++i) {
                 const std::int32_t lane = static_cast<std::int32_t>(i);
-                source[i] = exchange ? lane ^ distance : lane >= distance ? lane - distance : static_cast<std::int32_t>(lanes);
+                source[i] = exchange           ? lane ^ distance
+                            : lane >= distance ? lane - distance
+                                               : static_cast<std::int32_t>(lanes);
             }
             return builder.CreateShuffleVector(from, identity, source);
         };

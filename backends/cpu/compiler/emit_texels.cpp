@@ -21,8 +21,8 @@ namespace {
 /// 1.5 * 2^23: floats next to it are whole numbers apart, and the low bits of a sum with it are the number.
 constexpr float whole_numbers = 12582912.0f;
 
-/// Tells LLVM that one of the cases is almost always the one: what goes on then stays in registers and in one piece, and
-/// the call, which no vector register outlives, saves and restores what it must beside.
+/// Tells LLVM that one of the cases is almost always the one: what goes on then stays in registers and in one piece,
+/// and the call, which no vector register outlives, saves and restores what it must beside.
 void expect_cases(llvm::SwitchInst& which) {
     std::vector<std::uint32_t> weights(which.getNumSuccessors(), 2000);
     weights[0] = 1;  // the default
@@ -235,7 +235,8 @@ std::vector<Component> Emitter::fetch_once(const Component& image, Id image_type
     llvm::Type *word = builder.getInt32Ty(), *pair = builder.getInt64Ty();
     llvm::FunctionCallee callee = external("nacre_cpu_texel", llvm::StructType::get(context, {pair, pair}),
                                            {pointer_type, word, word, word, word, word});
-    // No shader writes what it fetches, and no argument does harm: as arithmetic, it may be done earlier, once for many.
+    // No shader writes what it fetches, and no argument does harm: as arithmetic, it may be done earlier, once for
+    // many.
     auto& function = *llvm::cast<llvm::Function>(callee.getCallee());
     function.setMemoryEffects(llvm::MemoryEffects::none());
     for (const auto attribute : {llvm::Attribute::NoUnwind, llvm::Attribute::WillReturn, llvm::Attribute::Speculatable,

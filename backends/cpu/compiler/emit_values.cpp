@@ -40,7 +40,8 @@ Value Emitter::constant(Id id) {
             std::uint64_t bits = at.operand(0);
             if (type.bits == 64) bits |= std::uint64_t{at.operand(1)} << 32;
             llvm::Type* integer = builder.getIntNTy(type.bits);
-            llvm::Constant* word = llvm::ConstantInt::get(integer, type.bits < 64 ? bits & ((1ull << type.bits) - 1) : bits);
+            llvm::Constant* word =
+                llvm::ConstantInt::get(integer, type.bits < 64 ? bits & ((1ull << type.bits) - 1) : bits);
             value.components = {word};
             if (type.kind == TypeKind::floating) {
                 llvm::APFloat number(type.bits == 16   ? llvm::APFloat::IEEEhalf()
@@ -63,8 +64,11 @@ Value Emitter::constant(Id id) {
             break;
         case Op::OpSpecConstantOp:
             value.components = evaluate(static_cast<Op>(at.operand(0)), at.type, at.operands.subspan(1), id);
-            if (value.components.empty()) value.components = evaluate_composite(static_cast<Op>(at.operand(0)), at.type, at.operands.subspan(1));
-            if (value.components.empty()) reject(fmt::format("a specialization constant is made by opcode {}, which is not supported", at.operand(0)));
+            if (value.components.empty())
+                value.components = evaluate_composite(static_cast<Op>(at.operand(0)), at.type, at.operands.subspan(1));
+            if (value.components.empty())
+                reject(fmt::format("a specialization constant is made by opcode {}, which is not supported",
+                                   at.operand(0)));
             // Instructions stand for it only here.
             for (const Component& component : value.components)
                 if (!llvm::isa<llvm::Constant>(component.value)) return value;
@@ -119,10 +123,12 @@ Pointer Emitter::get_pointer(Id id) {
     const Value value = get(id);
     if (value.pointer) return *value.pointer;
     const Type& type = module.type(module.type_of(id));
-    if (type.kind != TypeKind::pointer || value.components.size() != 3) reject("a pointer is expected and something else is found");
+    if (type.kind != TypeKind::pointer || value.components.size() != 3)
+        reject("a pointer is expected and something else is found");
     Pointer pointer;
     pointer.storage = type.storage, pointer.type = type.element;
-    pointer.base = apply({value.components[0]}, [&](auto v) { return builder.CreateIntToPtr(v[0], like(v[0], pointer_type)); });
+    pointer.base =
+        apply({value.components[0]}, [&](auto v) { return builder.CreateIntToPtr(v[0], like(v[0], pointer_type)); });
     pointer.limit = value.components[1];
     pointer.dynamic_offset = value.components[2];
     pointer.needs_limit_check = true;
@@ -191,8 +197,9 @@ void Emitter::finish_definition(Id id) {
     keep(value.image), keep(value.sampler);
     if (value.pointer) {
         auto own = std::make_shared<Pointer>(*value.pointer);
-        for (Component* part : {&own->valid, &own->dynamic_component, &own->base, &own->shadow, &own->limit, &own->dynamic_offset,
-                                &own->descriptor_index, &own->descriptor_address, &own->image_descriptor, &own->sample})
+        for (Component* part :
+             {&own->valid, &own->dynamic_component, &own->base, &own->shadow, &own->limit, &own->dynamic_offset,
+              &own->descriptor_index, &own->descriptor_address, &own->image_descriptor, &own->sample})
             keep(*part);
         for (Pointer::Index& at : own->indices) keep(at.index), keep(at.bound);
         for (Component& coordinate : own->coordinates) keep(coordinate);

@@ -42,7 +42,8 @@ void Emitter::for_each_component_type(Id id, const std::function<void(const Type
             break;
         case TypeKind::pointer:
             if (!type.components) reject("a type without a value is used as one");
-            visit(module.type(pointer_word_type)), visit(module.type(pointer_word_type)), visit(module.type(pointer_offset_type));
+            visit(module.type(pointer_word_type)), visit(module.type(pointer_word_type)),
+                visit(module.type(pointer_offset_type));
             break;
         default: reject("a type without a value is used as one");
     }
@@ -171,14 +172,16 @@ Component Emitter::add(const Component& a, const Component& b) {
         sum.linear_base = builder.CreateAdd(b.linear_base, a.value), sum.linear_stride = b.linear_stride;
     else if (a.linear_base && b.linear_base)
         sum.linear_base = builder.CreateAdd(a.linear_base, b.linear_base),
-        sum.linear_stride = Component::wrapped(static_cast<std::uint64_t>(std::int64_t{a.linear_stride} + b.linear_stride));
+        sum.linear_stride =
+            Component::wrapped(static_cast<std::uint64_t>(std::int64_t{a.linear_stride} + b.linear_stride));
     return sum;
 }
 
 Component Emitter::multiply(const Component& a, std::int64_t factor) {
     if (!a || factor == 1) return a;
     Component product = apply({a}, [&](auto v) {
-        return builder.CreateMul(v[0], llvm::ConstantInt::getSigned(v[0]->getType(), static_cast<std::int32_t>(factor)));
+        return builder.CreateMul(v[0],
+                                 llvm::ConstantInt::getSigned(v[0]->getType(), static_cast<std::int32_t>(factor)));
     });
     if (a.linear_base)
         product.linear_base = builder.CreateMul(a.linear_base, int32(factor)),
@@ -215,7 +218,8 @@ llvm::Type* Emitter::like(llvm::Value* shape, llvm::Type* scalar) {
     return shape->getType()->isVectorTy() ? static_cast<llvm::Type*>(vector_of(scalar)) : scalar;
 }
 
-void Emitter::emit_batches(std::uint32_t pointers, std::size_t batch_bytes, const std::function<void(llvm::Value* batch)>& body) {
+void Emitter::emit_batches(std::uint32_t pointers, std::size_t batch_bytes,
+                           const std::function<void(llvm::Value* batch)>& body) {
     std::vector<llvm::Type*> arguments(pointers, pointer_type);
     arguments.push_back(builder.getInt32Ty());
     auto* type = llvm::FunctionType::get(builder.getVoidTy(), arguments, false);

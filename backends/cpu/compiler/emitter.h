@@ -24,10 +24,11 @@
 /// @file
 /// From SPIR-V to LLVM IR that runs `lanes` invocations at once.
 ///
-/// One value is one or several *components* (its scalars, flattened in declaration order); a component is a scalar where all
-/// lanes agree and a vector over the lanes where they can differ. Control flow becomes a sequence of blocks, each with a mask
-/// of the lanes that run it and, where it pays, a branch that skips it when no lane does. Functions are emitted where they are
-/// called. Everything that must survive from one block to another lies in stack slots, from which LLVM makes registers.
+/// One value is one or several *components* (its scalars, flattened in declaration order); a component is a scalar
+/// where all lanes agree and a vector over the lanes where they can differ. Control flow becomes a sequence of blocks,
+/// each with a mask of the lanes that run it and, where it pays, a branch that skips it when no lane does. Functions
+/// are emitted where they are called. Everything that must survive from one block to another lies in stack slots, from
+/// which LLVM makes registers.
 ///
 /// The files `emit_*.cpp` hold one group of instructions each.
 
@@ -41,19 +42,22 @@ struct Component {
     /// Where the lanes rise evenly: value of lane i is linear_base + i * linear_stride (modulo 2^32).
     llvm::Value* linear_base = nullptr;
     std::int32_t linear_stride = 0;
-    /// Lanes whose value depends on something that nothing has written: i1, or a vector of it. Null: none, or nobody asks.
+    /// Lanes whose value depends on something that nothing has written: i1, or a vector of it. Null: none, or nobody
+    /// asks.
     llvm::Value* undefined = nullptr;
 
     Component() = default;
     Component(llvm::Value* only) : value(only) {}  // NOLINT: a component is its value.
     /// A stride modulo 2^32.
-    static std::int32_t wrapped(std::uint64_t stride) { return static_cast<std::int32_t>(static_cast<std::uint32_t>(stride)); }
+    static std::int32_t wrapped(std::uint64_t stride) {
+        return static_cast<std::int32_t>(static_cast<std::uint32_t>(stride));
+    }
     [[nodiscard]] bool is_uniform() const { return !value->getType()->isVectorTy(); }
     explicit operator bool() const { return value != nullptr; }
 };
 
-/// A variable whose content lies in registers or on the stack: for each scalar one slot of `lanes` elements, or one element
-/// where all lanes agree.
+/// A variable whose content lies in registers or on the stack: for each scalar one slot of `lanes` elements, or one
+/// element where all lanes agree.
 struct LaneVariable {
     Id type = 0;
     bool is_uniform = false;
@@ -100,7 +104,8 @@ struct Pointer {
     // Kind::descriptor: one element or an array of them.
     std::uint32_t set = 0, binding = 0;
     Component descriptor_index;      ///< i32; null: 0.
-    Component descriptor_address;    ///< ptr, instead of set, binding and index: what a function was given; of bytes: that of their buffer.
+    Component descriptor_address;    ///< ptr, instead of set, binding and index: what a function was given; of bytes:
+                                     ///< that of their buffer.
 
     // Kind::texel
     Component image_descriptor;
@@ -190,9 +195,10 @@ class Emitter {
     [[nodiscard]] llvm::Type* vector_of(llvm::Type* scalar) { return llvm::FixedVectorType::get(scalar, lanes); }
     /// `scalar`, or a vector of it where `shape` is a vector.
     llvm::Type* like(llvm::Value* shape, llvm::Type* scalar);
-    /// Makes the function `kernel(pointers..., count)` that runs `body` for each of `count` batches; the first pointer is the
-    /// context, the last the batches.
-    void emit_batches(std::uint32_t pointers, std::size_t batch_bytes, const std::function<void(llvm::Value* batch)>& body);
+    /// Makes the function `kernel(pointers..., count)` that runs `body` for each of `count` batches; the first pointer
+    /// is the context, the last the batches.
+    void emit_batches(std::uint32_t pointers, std::size_t batch_bytes,
+                      const std::function<void(llvm::Value* batch)>& body);
     /// Id of the scalar type of component `index` of a value of type `type`.
     [[nodiscard]] Id component_type(Id type, std::uint32_t index) const;
     void for_each_component_type(Id type, const std::function<void(const Type&)>& visit) const;
@@ -201,12 +207,15 @@ class Emitter {
     llvm::Value* widen(const Component& component);
     /// The component as a scalar: itself, or the value of the first lane of `mask`.
     llvm::Value* narrow(const Component& component, llvm::Value* mask);
-    llvm::Constant* int32(std::int64_t value) { return llvm::ConstantInt::getSigned(builder.getInt32Ty(), static_cast<std::int32_t>(value)); }
+    llvm::Constant* int32(std::int64_t value) {
+        return llvm::ConstantInt::getSigned(builder.getInt32Ty(), static_cast<std::int32_t>(value));
+    }
     llvm::Constant* int64(std::int64_t value) { return llvm::ConstantInt::getSigned(builder.getInt64Ty(), value); }
     llvm::Value* lane_numbers();                         ///< <0, 1, 2, ...> as i32.
     llvm::Value* any(llvm::Value* mask);                 ///< i1: some lane is on.
     llvm::Value* mask_bits(llvm::Value* mask);           ///< i32 with one bit for each lane.
-    llvm::Value* first_lane(llvm::Value* mask);          ///< i32: the lowest lane that is on (of an empty mask: the highest of all).
+    llvm::Value* first_lane(
+        llvm::Value* mask);  ///< i32: the lowest lane that is on (of an empty mask: the highest of all).
     llvm::Value* all_lanes();                            ///< The mask of all lanes.
     [[nodiscard]] static bool is_all(llvm::Value* mask);  ///< A constant that is true in all lanes.
     llvm::Value* both(llvm::Value* mask, llvm::Value* condition);  ///< Mask and condition (scalar or vector).
@@ -243,12 +252,14 @@ class Emitter {
 
     // ---- Control flow (emit_control_flow.cpp)
     /// Emits a function for the lanes of `mask`; returns its result.
-    std::vector<Component> emit_function(const Function& function, const std::vector<Value>& arguments, llvm::Value* mask);
+    std::vector<Component> emit_function(const Function& function, const std::vector<Value>& arguments,
+                                         llvm::Value* mask);
 
     // ---- Functions that are called and not emitted in place (emit_calls.cpp)
     void emit_call(const Instruction& at);
     void share_environment();                            ///< When everything that functions may use has been made.
-    virtual void add_stage_values(std::vector<llvm::Value**>&) {}  ///< What a stage keeps in members and functions may use.
+    virtual void add_stage_values(std::vector<llvm::Value**>&) {
+    }  ///< What a stage keeps in members and functions may use.
 
     // ---- Instructions
     void emit_instruction(const Instruction& at);                       // emit_instruction.cpp
@@ -273,7 +284,7 @@ class Emitter {
     };
     /// The instruction on doubles, for images of floats.
     void emit_double_image(const Instruction& at, const ImageAccess& access);
-    llvm::Value* bound_view(llvm::Value* descriptor_address);           ///< ptr to ImageView; to zeros where nothing is bound.
+    llvm::Value* bound_view(llvm::Value* descriptor_address);  ///< ptr to ImageView; to zeros where nothing is bound.
     void put_argument(std::size_t offset, const Component& value);
     llvm::Value* image_memory();                                        ///< An ImageArguments on the stack.
     void set_image_atomic(AtomicOperation operation, const Component& comparator);
@@ -358,7 +369,8 @@ class Emitter {
                             const std::function<void(llvm::Value*, llvm::Value*)>& body);
     /// What an atomic operation on integers leaves behind.
     llvm::Value* combine(llvm::AtomicRMWInst::BinOp operation, llvm::Value* old, llvm::Value* value);
-    /// The value that stands for those of all lanes of `lanes_on` (one at least), where their order makes no difference.
+    /// The value that stands for those of all lanes of `lanes_on` (one at least), where their order makes no
+    /// difference.
     llvm::Value* combine_lanes(llvm::AtomicRMWInst::BinOp operation, const Component& value, llvm::Value* lanes_on);
     /// Runs `body` for each lane of `mask` in turn.
     void for_each_lane(llvm::Value* mask, const std::function<void(llvm::Value* lane)>& body);
@@ -373,12 +385,14 @@ class Emitter {
     void check_result(const Instruction& at);
     /// Indices on the way of a pointer, and the whole value that it leads to.
     void check_range(const Pointer& pointer);
-    void check_index(const Component& index, const Component& bound, const std::string& object, const Pointer* pointer = nullptr);
+    void check_index(const Component& index, const Component& bound, const std::string& object,
+                     const Pointer* pointer = nullptr);
     llvm::Value* undefined_in_any(std::span<const Component> components);  ///< Null: nowhere.
     void check_undefined(std::span<const Component> components, const std::string& object);
     /// Every quad in which some but not all lanes run.
     void check_quads();
-    /// Takes note of an access to a scalar, by MemoryAccess; returns the lanes that read what is undefined, null: none can.
+    /// Takes note of an access to a scalar, by MemoryAccess; returns the lanes that read what is undefined, null: none
+    /// can.
     llvm::Value* check_memory(const Pointer& pointer, std::int64_t extra, const Type& scalar, std::uint32_t access,
                               llvm::Value* undefined);
     llvm::Value* call_check_memory(llvm::Value* site, llvm::Value* descriptors, llvm::Value* addresses,
@@ -494,7 +508,8 @@ class Emitter {
         struct BlockShape {
             bool reconverges = false;            ///< Header: all lanes meet again at the merge block.
             bool is_reconverged = false;         ///< Merge block of such a header.
-            std::uint32_t divergent_loop = ~0u;  ///< Innermost loop around it that lanes leave one by one: header's index.
+            std::uint32_t divergent_loop =
+                ~0u;  ///< Innermost loop around it that lanes leave one by one: header's index.
             // Headers of loops:
             std::uint32_t end = 0;               ///< Index of the first block behind the loop.
             bool returns_values = false;         ///< Some block of the loop returns from the function.
@@ -505,7 +520,7 @@ class Emitter {
             std::uint32_t home = 0;              ///< Block that makes the value.
             std::uint32_t last = 0;              ///< Last block that uses it.
             bool is_leaving = false;             ///< Used behind a loop that lanes leave one by one, made inside.
-            bool is_remade = false;              ///< A pointer or image: behind such loops made again from its operands.
+            bool is_remade = false;  ///< A pointer or image: behind such loops made again from its operands.
             bool is_used = false;                ///< Somewhere at all.
         };
         std::vector<BlockShape> blocks;

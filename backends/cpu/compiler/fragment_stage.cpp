@@ -16,13 +16,15 @@ using spv::Op;
 namespace {
 
 /// Four samples of the standard pattern, in pixels (Vulkan specification, "Standard Sample Locations").
-constexpr std::array<std::array<float, 2>, 4> sample_places{{{0.375f, 0.125f}, {0.875f, 0.375f}, {0.125f, 0.625f}, {0.625f, 0.875f}}};
+constexpr std::array<std::array<float, 2>, 4> sample_places{
+    {{0.375f, 0.125f}, {0.875f, 0.375f}, {0.125f, 0.625f}, {0.625f, 0.875f}}};
 
 }  // namespace
 
 /// The word at an offset in each quad's primitive, spread over the quad.
 Component FragmentEmitter::primitive_word(std::size_t offset, llvm::Type* type) {
-    if (is_one_primitive) return Component(splat(invariant_load(type, at_offset(primitives[0], static_cast<std::int64_t>(offset)), 4)));
+    if (is_one_primitive)
+        return Component(splat(invariant_load(type, at_offset(primitives[0], static_cast<std::int64_t>(offset)), 4)));
     const std::uint32_t quads = lanes / 4;
     const std::size_t aligned = offset / 16 * 16;
     const int part = static_cast<int>(offset % 16 / 4);
@@ -41,7 +43,8 @@ Component FragmentEmitter::primitive_word(std::size_t offset, llvm::Type* type) 
     while (parts.size() > 1) {
         std::vector<llvm::Value*> joined;
         for (std::size_t i = 0; i + 1 < parts.size(); i += 2) {
-            const int length = static_cast<int>(llvm::cast<llvm::FixedVectorType>(parts[i]->getType())->getNumElements());
+            const int length =
+                static_cast<int>(llvm::cast<llvm::FixedVectorType>(parts[i]->getType())->getNumElements());
             llvm::SmallVector<int, 16> all(static_cast<std::size_t>(2 * length));
             for (int k = 0; k < 2 * length; ++k) all[static_cast<std::size_t>(k)] = k;
             joined.push_back(builder.CreateShuffleVector(parts[i], parts[i + 1], all));
@@ -83,7 +86,9 @@ Component FragmentEmitter::evaluate_plane(std::size_t offset, const Place& place
     };
     llvm::Value* x = relative(place.x, is_depth ? offsetof(PrimitiveData, x0) : offsetof(PrimitiveData, origin_x));
     llvm::Value* y = relative(place.y, is_depth ? offsetof(PrimitiveData, y0) : offsetof(PrimitiveData, origin_y));
-    if (is_depth) return Component(builder.CreateFAdd(builder.CreateFAdd(c, builder.CreateFMul(dx, x)), builder.CreateFMul(dy, y)));
+    if (is_depth)
+        return Component(
+            builder.CreateFAdd(builder.CreateFAdd(c, builder.CreateFMul(dx, x)), builder.CreateFMul(dy, y)));
     const auto fused = [&](llvm::Value* a, llvm::Value* b, llvm::Value* sum) {
         return builder.CreateIntrinsic(sum->getType(), llvm::Intrinsic::fma, {a, b, sum});
     };
@@ -95,7 +100,8 @@ Component FragmentEmitter::evaluate_input(std::uint32_t index, const Place& plac
     const FragmentInput& input = program.inputs[index];
     if (input.interpolation == Interpolation::flat && in_double() && scalar.kind == TypeKind::floating)
         return primitive_double(sizeof(DoublePrimitive) + index * sizeof(DoublePlane) + offsetof(DoublePlane, c));
-    if (input.interpolation == Interpolation::flat) return from_word(primitive_word(offset, builder.getInt32Ty()), scalar_type(scalar));
+    if (input.interpolation == Interpolation::flat)
+        return from_word(primitive_word(offset, builder.getInt32Ty()), scalar_type(scalar));
     Component value = evaluate_plane(offset, place);
     if (input.interpolation == Interpolation::perspective) {
         llvm::Value* inverse = evaluate_plane(offsetof(PrimitiveData, inverse_w), place).value;
@@ -122,7 +128,8 @@ std::vector<llvm::Value*> FragmentEmitter::evaluate_inputs() {
     std::vector<llvm::Value*> values;
     for (std::uint32_t i = 0; i < input_scalars_.size(); ++i) {
         const InterfaceScalar& at = input_scalars_[i];
-        values.push_back(evaluate_input(i, at.centroid && !program.runs_per_sample ? centroid : center, module.type(at.type)).value);
+        values.push_back(
+            evaluate_input(i, at.centroid && !program.runs_per_sample ? centroid : center, module.type(at.type)).value);
     }
     if (follows_undefined())
         for (std::uint32_t i = 0; i < input_scalars_.size(); ++i) values.push_back(undefined_input(i));
@@ -131,9 +138,11 @@ std::vector<llvm::Value*> FragmentEmitter::evaluate_inputs() {
     return values;
 }
 
-std::vector<llvm::Value*> FragmentEmitter::for_one_or_several(const std::function<std::vector<llvm::Value*>()>& evaluate) {
+std::vector<llvm::Value*> FragmentEmitter::for_one_or_several(
+    const std::function<std::vector<llvm::Value*>()>& evaluate) {
     llvm::Value* is_one = builder.getTrue();
-    for (std::uint32_t q = 1; q < lanes / 4; ++q) is_one = builder.CreateAnd(is_one, builder.CreateICmpEQ(primitives[q], primitives[0]));
+    for (std::uint32_t q = 1; q < lanes / 4; ++q)
+        is_one = builder.CreateAnd(is_one, builder.CreateICmpEQ(primitives[q], primitives[0]));
     llvm::BasicBlock* one = llvm::BasicBlock::Create(context, "one_primitive", function_);
     llvm::BasicBlock* several = llvm::BasicBlock::Create(context, "several_primitives", function_);
     llvm::BasicBlock* next = llvm::BasicBlock::Create(context, "inputs", function_);
@@ -170,12 +179,14 @@ void FragmentEmitter::declare_inputs() {
         const Variable* variable = module.variable(id);
         if (!variable || variable->storage != spv::StorageClass::Input) continue;
         if (variable->builtin) {
-            if (*variable->builtin == BuiltIn::SampleId || *variable->builtin == BuiltIn::SamplePosition) program.runs_per_sample = true;
+            if (*variable->builtin == BuiltIn::SampleId || *variable->builtin == BuiltIn::SamplePosition)
+                program.runs_per_sample = true;
             const bool is_clip = *variable->builtin == BuiltIn::ClipDistance;
             if (!is_clip && *variable->builtin != BuiltIn::CullDistance) continue;
             for (std::uint32_t i = 0; i < module.type(variable->type).components; ++i) {
                 input_numbers_[id].push_back(static_cast<std::uint32_t>(program.inputs.size()));
-                program.inputs.push_back({is_clip ? clip_distance_location : cull_distance_location, i, Interpolation::perspective});
+                program.inputs.push_back(
+                    {is_clip ? clip_distance_location : cull_distance_location, i, Interpolation::perspective});
                 InterfaceScalar distance;
                 distance.type = component_type(variable->type, 0);
                 input_scalars_.push_back(distance);
@@ -194,7 +205,9 @@ void FragmentEmitter::declare_inputs() {
             FragmentInput input;
             input.location = at.location, input.component = at.component;
             const bool is_flat = at.flat || module.type(at.type).kind != TypeKind::floating;
-            input.interpolation = is_flat ? Interpolation::flat : at.no_perspective ? Interpolation::linear : Interpolation::perspective;
+            input.interpolation = is_flat             ? Interpolation::flat
+                                  : at.no_perspective ? Interpolation::linear
+                                                      : Interpolation::perspective;
             program.runs_per_sample = program.runs_per_sample || (at.sample && !is_flat);
             program.uses_centroid = program.uses_centroid || (at.centroid && !is_flat);
             numbers.push_back(static_cast<std::uint32_t>(program.inputs.size()));
@@ -219,10 +232,12 @@ void FragmentEmitter::declare_inputs() {
     }
     for (const auto& [id, function] : module.functions())
         for (const Block& block : function.blocks) {
-            if (block.terminator.op == Op::OpKill || block.terminator.op == Op::OpTerminateInvocation) program.discards = true;
+            if (block.terminator.op == Op::OpKill || block.terminator.op == Op::OpTerminateInvocation)
+                program.discards = true;
             for (const Instruction& at : block.body) {
                 if (at.op == Op::OpDemoteToHelperInvocation) program.discards = true;
-                if (at.op == Op::OpExtInst && module.is_glsl_set(at.operand(0)) && at.operand(1) == GLSLstd450InterpolateAtCentroid)
+                if (at.op == Op::OpExtInst && module.is_glsl_set(at.operand(0)) &&
+                    at.operand(1) == GLSLstd450InterpolateAtCentroid)
                     program.uses_centroid = true;
             }
         }
@@ -230,7 +245,8 @@ void FragmentEmitter::declare_inputs() {
 
 std::vector<Component> FragmentEmitter::input_components(const Variable& variable) {
     const auto float_word = [&](std::size_t offset) -> llvm::Value* {
-        return builder.CreateAlignedLoad(builder.getFloatTy(), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4));
+        return builder.CreateAlignedLoad(builder.getFloatTy(), at_offset(batch, static_cast<std::int64_t>(offset)),
+                                         llvm::Align(4));
     };
     if (variable.builtin) {
         if (auto of_subgroup = subgroup_input(*variable.builtin)) return std::move(*of_subgroup);
@@ -238,16 +254,19 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
             case BuiltIn::ClipDistance:
             case BuiltIn::CullDistance: {
                 std::vector<Component> made;
-                for (const std::uint32_t number : input_numbers_.at(variable.instruction.result)) made.push_back(Component(inputs_[number]));
+                for (const std::uint32_t number : input_numbers_.at(variable.instruction.result))
+                    made.push_back(Component(inputs_[number]));
                 return made;
             }
             case BuiltIn::FragCoord:
-                return {Component(center.x), Component(center.y), Component(inputs_[inputs_.size() - 2]), Component(inputs_.back())};
+                return {Component(center.x), Component(center.y), Component(inputs_[inputs_.size() - 2]),
+                        Component(inputs_.back())};
             case BuiltIn::FrontFacing: {
                 llvm::Value* word = primitive_word(offsetof(PrimitiveData, front_facing), builder.getInt32Ty()).value;
                 return {Component(builder.CreateICmpNE(word, llvm::Constant::getNullValue(word->getType())))};
             }
-            case BuiltIn::PrimitiveId: return {primitive_word(offsetof(PrimitiveData, primitive_id), builder.getInt32Ty())};
+            case BuiltIn::PrimitiveId:
+                return {primitive_word(offsetof(PrimitiveData, primitive_id), builder.getInt32Ty())};
             case BuiltIn::Layer: return {primitive_word(offsetof(PrimitiveData, layer), builder.getInt32Ty())};
             case BuiltIn::ViewIndex:
             case BuiltIn::ViewportIndex:
@@ -262,29 +281,36 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
                     return {inside(center.x, offsetof(DoublePrimitive, point_x)),
                             inside(center.y, offsetof(DoublePrimitive, point_y))};
                 }
-                llvm::Value* scale = primitive_word(offsetof(PrimitiveData, inverse_point_size), builder.getFloatTy()).value;
+                llvm::Value* scale =
+                    primitive_word(offsetof(PrimitiveData, inverse_point_size), builder.getFloatTy()).value;
                 llvm::Value* left = primitive_word(offsetof(PrimitiveData, origin_x), builder.getFloatTy()).value;
                 llvm::Value* top = primitive_word(offsetof(PrimitiveData, origin_y), builder.getFloatTy()).value;
                 return {Component(builder.CreateFMul(builder.CreateFSub(center.x, left), scale)),
                         Component(builder.CreateFMul(builder.CreateFSub(center.y, top), scale))};
             }
             case BuiltIn::SampleId:
-                return {Component(builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, sample_index)), llvm::Align(4)))};
+                return {Component(builder.CreateAlignedLoad(
+                    builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, sample_index)), llvm::Align(4)))};
             case BuiltIn::SamplePosition:
                 return {from_single(float_word(offsetof(FragmentBatch, sample_x))),
                         from_single(float_word(offsetof(FragmentBatch, sample_y)))};
             case BuiltIn::SampleMask: {
                 std::vector<Component> made(module.type(variable.type).components, Component(int32(0)));
-                made[0] = Component(builder.CreateAlignedLoad(vector_of(builder.getInt32Ty()), at_offset(batch, offsetof(FragmentBatch, sample_mask_in)), llvm::Align(64)));
+                made[0] = Component(builder.CreateAlignedLoad(vector_of(builder.getInt32Ty()),
+                                                              at_offset(batch, offsetof(FragmentBatch, sample_mask_in)),
+                                                              llvm::Align(64)));
                 return made;
             }
             case BuiltIn::HelperInvocation: return {Component(builder.CreateNot(live()))};
-            default: reject(fmt::format("built-in input {} is not supported in fragment shaders", static_cast<unsigned>(*variable.builtin)));
+            default:
+                reject(fmt::format("built-in input {} is not supported in fragment shaders",
+                                   static_cast<unsigned>(*variable.builtin)));
         }
     }
     const auto scalars = interface_scalars(module, variable);
     const auto numbers = input_numbers_.find(variable.instruction.result);
-    if (!scalars || numbers == input_numbers_.end()) reject(fmt::format("input '{}' is not supported in fragment shaders", variable.name));
+    if (!scalars || numbers == input_numbers_.end())
+        reject(fmt::format("input '{}' is not supported in fragment shaders", variable.name));
     std::vector<Component> made;
     for (std::size_t i = 0; i < scalars->size(); ++i) {
         const std::uint32_t number = numbers->second[i];
@@ -295,7 +321,8 @@ std::vector<Component> FragmentEmitter::input_components(const Variable& variabl
             continue;
         }
         llvm::Type* wide = vector_of(builder.getInt64Ty());
-        llvm::Value* bits = builder.CreateOr(builder.CreateZExt(inputs_[number], wide), builder.CreateShl(builder.CreateZExt(inputs_[number + 1], wide), 32));
+        llvm::Value* bits = builder.CreateOr(builder.CreateZExt(inputs_[number], wide),
+                                             builder.CreateShl(builder.CreateZExt(inputs_[number + 1], wide), 32));
         made.emplace_back(builder.CreateBitCast(bits, vector_of(scalar_type(module.type((*scalars)[i].type)))));
         made.back().undefined = undefined;
     }
@@ -333,7 +360,8 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
         case Op::OpExtInst: {
             if (!module.is_glsl_set(at.operand(0))) return false;
             const std::uint32_t number = at.operand(1);
-            if (number != GLSLstd450InterpolateAtCentroid && number != GLSLstd450InterpolateAtSample && number != GLSLstd450InterpolateAtOffset)
+            if (number != GLSLstd450InterpolateAtCentroid && number != GLSLstd450InterpolateAtSample &&
+                number != GLSLstd450InterpolateAtOffset)
                 return false;
             const Pointer pointer = get_pointer(at.operand(2));
             Place place = centroid;
@@ -356,13 +384,15 @@ bool FragmentEmitter::emit_stage(const Instruction& at) {
                     y = y ? select(is_this, here_y, y) : here_y;
                 }
                 // The only sample of other targets is in the middle.
-                llvm::Value* samples = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, samples)), llvm::Align(4));
+                llvm::Value* samples = builder.CreateAlignedLoad(
+                    builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, samples)), llvm::Align(4));
                 llvm::Value* several = builder.CreateICmpUGT(samples, int32(1));
                 llvm::Value* middle = llvm::ConstantFP::get(x->getType(), 0.5);
                 place = place_at(select(several, x, middle), select(several, y, middle));
             }
             const auto numbers = input_numbers_.find(pointer.variable_id);
-            if (numbers == input_numbers_.end() || pointer.dynamic_component) reject("interpolation at a place needs an input with a constant index");
+            if (numbers == input_numbers_.end() || pointer.dynamic_component)
+                reject("interpolation at a place needs an input with a constant index");
             std::vector<Component> made;
             std::uint32_t index = pointer.component;
             for_each_component_type(at.type, [&](const Type& scalar) {
@@ -406,7 +436,8 @@ void FragmentEmitter::store_outputs() {
         if (options.checks) check_outputs(*variable, values);
         if (variable->builtin) {
             const auto put = [&](std::size_t offset) {
-                builder.CreateAlignedStore(widen(to_word(values.at(0))), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
+                builder.CreateAlignedStore(widen(to_word(values.at(0))),
+                                           at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
             };
             if (*variable->builtin == BuiltIn::FragDepth) {
                 program.writes_depth = true;
@@ -423,9 +454,11 @@ void FragmentEmitter::store_outputs() {
         for (std::size_t i = 0; i < scalars->size(); ++i) {
             const InterfaceScalar& at = (*scalars)[i];
             const std::uint32_t output = variable->index == 1 ? dual_source_output + at.location : at.location;
-            if (output >= max_color_outputs || at.component >= 4) reject("a color output lies behind the last location");
+            if (output >= max_color_outputs || at.component >= 4)
+                reject("a color output lies behind the last location");
             const std::size_t offset = offsetof(FragmentBatch, colors) + (output * 4 + at.component) * max_lanes * 4;
-            builder.CreateAlignedStore(widen(to_word(values[i])), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
+            builder.CreateAlignedStore(widen(to_word(values[i])), at_offset(batch, static_cast<std::int64_t>(offset)),
+                                       llvm::Align(64));
             put_double(offsetof(FragmentDoubles, colors) + (output * 4 + at.component) * max_lanes * 8, values[i]);
             auto found = std::ranges::find(program.outputs, output, &FragmentOutput::output);
             if (found == program.outputs.end()) program.outputs.push_back({output, at.component + 1});
@@ -452,12 +485,15 @@ void FragmentEmitter::emit() {
 void FragmentEmitter::emit_batch() {
     const std::uint32_t quads = lanes / 4;
     for (std::uint32_t q = 0; q < quads; ++q)
-        primitives[q] = builder.CreateAlignedLoad(pointer_type, at_offset(batch, static_cast<std::int64_t>(offsetof(FragmentBatch, primitives) + q * 8)), llvm::Align(8));
+        primitives[q] = builder.CreateAlignedLoad(
+            pointer_type, at_offset(batch, static_cast<std::int64_t>(offsetof(FragmentBatch, primitives) + q * 8)),
+            llvm::Align(8));
     llvm::SmallVector<int, 16> quad_of_lane(lanes);
     for (std::uint32_t i = 0; i < lanes; ++i) quad_of_lane[i] = static_cast<int>(i / 4);
     const auto corner = [&](std::size_t offset) {
         auto* each_quad = llvm::FixedVectorType::get(builder.getInt32Ty(), quads);
-        llvm::Value* corners = builder.CreateAlignedLoad(each_quad, at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4));
+        llvm::Value* corners =
+            builder.CreateAlignedLoad(each_quad, at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(4));
         return builder.CreateShuffleVector(corners, quad_of_lane);
     };
     llvm::Value* x = corner(offsetof(FragmentBatch, x));
@@ -484,11 +520,13 @@ void FragmentEmitter::emit_batch() {
                 vector_of(builder.getFloatTy()), at_offset(batch, static_cast<std::int64_t>(offset)), llvm::Align(64));
             return from_single(numbers).value;
         };
-        centroid = place_at(lane_float(offsetof(FragmentBatch, centroid_x)), lane_float(offsetof(FragmentBatch, centroid_y)));
+        centroid =
+            place_at(lane_float(offsetof(FragmentBatch, centroid_x)), lane_float(offsetof(FragmentBatch, centroid_y)));
     }
     inputs_ = for_one_or_several([&] { return evaluate_inputs(); });
     live_slot = make_slot(mask_type, "live");
-    llvm::Value* live_bits = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(FragmentBatch, live)), llvm::Align(4));
+    llvm::Value* live_bits = builder.CreateAlignedLoad(builder.getInt32Ty(),
+                                                       at_offset(batch, offsetof(FragmentBatch, live)), llvm::Align(4));
     store_live(builder.CreateBitCast(builder.CreateTrunc(live_bits, builder.getIntNTy(lanes)), mask_type));
     mask = all_lanes();
     if (trace_table) {

@@ -17,20 +17,23 @@ namespace {
 
 using spv::Op;
 
-/// Instructions up to which a module may grow as all calls are replaced by what they call. Beyond, functions that are called
-/// more than once become functions of the code that is made, the large ones first.
+/// Instructions up to which a module may grow as all calls are replaced by what they call. Beyond, functions that are
+/// called more than once become functions of the code that is made, the large ones first.
 constexpr std::uint64_t most_inlined_instructions = 60'000;
 /// Functions that are kept are at least so large; a call costs about as much as a smaller one.
 constexpr std::uint64_t kept_sizes[] = {4'000, 1'000, 250, 60};
-/// Blocks up to which SPIRV-Tools makes values of variables: it takes time by the square of their number. LLVM does it for others.
+/// Blocks up to which SPIRV-Tools makes values of variables: it takes time by the square of their number. LLVM does it
+/// for others.
 constexpr std::uint64_t most_rewritten_blocks = 3'000;
 /// Where even that does not help (functions with barriers are always inlined).
 constexpr std::uint64_t most_instructions = 2'000'000;
 
-/// The passes for local variables turn a read of one element into one of the whole variable: not for more scalars than this.
+/// The passes for local variables turn a read of one element into one of the whole variable: not for more scalars than
+/// this.
 constexpr std::uint64_t most_local_scalars = 4096;
 
-/// Which functions stay functions: those with FunctionControl::DontInline, by which `InlineExhaustivePass` and `Module` go.
+/// Which functions stay functions: those with FunctionControl::DontInline, by which `InlineExhaustivePass` and `Module`
+/// go.
 class InliningPlan {
   public:
     explicit InliningPlan(std::span<const std::uint32_t> words) {
@@ -48,7 +51,8 @@ class InliningPlan {
             const Op op = static_cast<Op>(at.opcode());
             if (op == Op::OpCapability) {
                 const auto capability = static_cast<spv::Capability>(at.operand(0));
-                has_variable_pointers_ |= capability == spv::Capability::VariablePointers || capability == spv::Capability::VariablePointersStorageBuffer;
+                has_variable_pointers_ |= capability == spv::Capability::VariablePointers ||
+                                          capability == spv::Capability::VariablePointersStorageBuffer;
             }
             if (function) ++function->own, ++own_instructions_;
             if (op == Op::OpLabel) ++own_blocks_;
@@ -61,7 +65,8 @@ class InliningPlan {
             }
             if (op == Op::OpTypeStruct) {
                 std::uint64_t& sum = scalars[at.operand(0)];
-                for (std::size_t i = 1; i + 1 < at.words.size(); ++i) sum += std::min(scalars_of(at.operand(i)), most_local_scalars + 1);
+                for (std::size_t i = 1; i + 1 < at.words.size(); ++i)
+                    sum += std::min(scalars_of(at.operand(i)), most_local_scalars + 1);
             }
             if (op == Op::OpTypePointer) {
                 const auto storage = static_cast<spv::StorageClass>(at.operand(1));
@@ -70,7 +75,11 @@ class InliningPlan {
             }
             switch (op) {
                 case Op::OpEntryPoint: entries.push_back(at.operand(1)); break;
-                case Op::OpTypeArray: case Op::OpTypeRuntimeArray: case Op::OpTypeRayQueryKHR: case Op::OpTypeImage: case Op::OpTypeSampler:
+                case Op::OpTypeArray:
+                case Op::OpTypeRuntimeArray:
+                case Op::OpTypeRayQueryKHR:
+                case Op::OpTypeImage:
+                case Op::OpTypeSampler:
                 case Op::OpTypeSampledImage: case Op::OpTypeAccelerationStructureKHR:
                     types[at.operand(0)] = op;
                     break;
@@ -89,7 +98,8 @@ class InliningPlan {
                     const auto type = types.find(pointee == pointees.end() ? at.operand(0) : pointee->second);
                     if (type == types.end()) break;
                     const bool is_array = type->second == Op::OpTypeArray || type->second == Op::OpTypeRuntimeArray;
-                    const bool is_value = pointee != pointees.end() && pointers[at.operand(0)] != spv::StorageClass::UniformConstant;
+                    const bool is_value =
+                        pointee != pointees.end() && pointers[at.operand(0)] != spv::StorageClass::UniformConstant;
                     if (type->second == Op::OpTypeRayQueryKHR || (is_array && !is_value && pointee != pointees.end()))
                         function->must_inline = true;
                     break;
@@ -106,7 +116,8 @@ class InliningPlan {
         order_by_calls();
         // Whoever calls a function that must be inlined must be inlined as well.
         for (FunctionSize* const at : callees_first_)
-            for (const std::uint32_t callee : at->callees) at->must_inline = at->must_inline || functions_[callee].must_inline;
+            for (const std::uint32_t callee : at->callees)
+                at->must_inline = at->must_inline || functions_[callee].must_inline;
         for (const std::uint32_t id : entries) functions_[id].is_entry = true;
         for (const std::uint32_t id : order_)
             for (const std::uint32_t callee : functions_[id].callees) ++functions_[callee].calls;
@@ -120,12 +131,15 @@ class InliningPlan {
     /// What is left to compile.
     [[nodiscard]] std::uint64_t instructions() const { return instructions_; }
 
-    /// Pointers may be loaded from variables: SPIRV-Tools' passes for local variables take such a load for one of the value.
+    /// Pointers may be loaded from variables: SPIRV-Tools' passes for local variables take such a load for one of the
+    /// value.
     [[nodiscard]] bool has_variable_pointers() const { return has_variable_pointers_; }
     /// A variable of a function or an invocation holds more than `most_local_scalars`.
     [[nodiscard]] bool has_large_variables() const { return has_large_variables_; }
     /// Basic blocks in it, about.
-    [[nodiscard]] std::uint64_t blocks() const { return own_blocks_ * instructions_ / std::max<std::uint64_t>(own_instructions_, 1); }
+    [[nodiscard]] std::uint64_t blocks() const {
+        return own_blocks_ * instructions_ / std::max<std::uint64_t>(own_instructions_, 1);
+    }
 
     void apply(std::vector<std::uint32_t>& words, bool inlines_all) const {
         constexpr auto dont_inline = static_cast<std::uint32_t>(spv::FunctionControlMask::DontInline);
@@ -146,8 +160,8 @@ class InliningPlan {
         bool is_entry = false, must_inline = false, is_kept = false, is_ordered = false;
     };
 
-    /// Without recursion of its own, since calls may be as deep as there are functions. What an entry point reaches has no cycles;
-    /// in what none reaches a cycle is cut somewhere.
+    /// Without recursion of its own, since calls may be as deep as there are functions. What an entry point reaches has
+    /// no cycles; in what none reaches a cycle is cut somewhere.
     void order_by_calls() {
         for (const std::uint32_t id : order_) {
             std::vector<std::pair<FunctionSize*, std::size_t>> path{{&functions_[id], 0}};
@@ -198,8 +212,8 @@ class InliningPlan {
 }  // namespace
 
 Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> words,
-                                              std::span<const rhi::SpecializationConstant> specialization, std::string_view name,
-                                              const LegalizationOptions& options) {
+                                              std::span<const rhi::SpecializationConstant> specialization,
+                                              std::string_view name, const LegalizationOptions& options) {
     const std::uint32_t version = words.size() > 1 ? words[1] : 0x10300;
     const spv_target_env environment = version <= 0x10300   ? SPV_ENV_VULKAN_1_1
                                        : version == 0x10400 ? SPV_ENV_VULKAN_1_1_SPIRV_1_4
@@ -207,9 +221,10 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
                                                             : SPV_ENV_VULKAN_1_3;
     spvtools::Optimizer optimizer(environment);
     std::string log;
-    optimizer.SetMessageConsumer([&](spv_message_level_t level, const char*, const spv_position_t&, const char* message) {
-        if (level <= SPV_MSG_ERROR) log += std::string(message) + "\n";
-    });
+    optimizer.SetMessageConsumer(
+        [&](spv_message_level_t level, const char*, const spv_position_t&, const char* message) {
+            if (level <= SPV_MSG_ERROR) log += std::string(message) + "\n";
+        });
     bool has_specialization = false;
     for (std::size_t at = 5; at < words.size() && (words[at] >> 16); at += words[at] >> 16) {
         const std::uint32_t op = words[at] & 0xffff;
@@ -234,7 +249,8 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
     const InliningPlan plan(words);
     if (plan.instructions() > most_instructions)
         return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", name),
-                    fmt::format("with its calls replaced by what they call the shader has {} instructions", plan.instructions()),
+                    fmt::format("with its calls replaced by what they call the shader has {} instructions",
+                                plan.instructions()),
                     "Call functions with barriers less often, or use another backend.");
     std::vector<std::uint32_t> planned(words.begin(), words.end());
     plan.apply(planned, options.inlines_all);
@@ -244,7 +260,8 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
         .RegisterPass(spvtools::CreateInlineExhaustivePass())
         .RegisterPass(spvtools::CreateEliminateDeadFunctionsPass())
         .RegisterPass(spvtools::CreatePrivateToLocalPass());
-    const bool rewrites_variables = !plan.has_variable_pointers() && !plan.has_large_variables() && !options.keeps_variables;
+    const bool rewrites_variables =
+        !plan.has_variable_pointers() && !plan.has_large_variables() && !options.keeps_variables;
     if (rewrites_variables)
         optimizer.RegisterPass(spvtools::CreateScalarReplacementPass(100))
             .RegisterPass(spvtools::CreateLocalAccessChainConvertPass())
@@ -261,8 +278,8 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
     if (!optimizer.Run(planned.data(), planned.size(), &result, optimizer_options)) {
         // Simpler is better, not needed; only specialization constants must be frozen.
         if (!has_specialization) return planned;
-        return fail(ErrorCode::shader_compile, "compile shader", fmt::format("'{}'", name), "the module cannot be specialized: " + log,
-                    "Check the types of the specialization constants.");
+        return fail(ErrorCode::shader_compile, "compile shader", fmt::format("'{}'", name),
+                    "the module cannot be specialized: " + log, "Check the types of the specialization constants.");
     }
     return result;
 }

@@ -15,11 +15,12 @@ struct LegalizationOptions {
     bool inlines_all = false;      ///< No function stays one, however large the module grows.
 };
 
-/// Makes a valid module simpler without changing what it does: specialization constants get their values, variables that need
-/// no memory become values, dead code goes, calls are replaced by what they call as long as the module does not grow too large
-/// (functions that stay have FunctionControl::DontInline). Errors: unsupported where nothing helps against its size. Thread-safe.
+/// Makes a valid module simpler without changing what it does: specialization constants get their values, variables
+/// that need no memory become values, dead code goes, calls are replaced by what they call as long as the module does
+/// not grow too large (functions that stay have FunctionControl::DontInline). Errors: unsupported where nothing helps
+/// against its size. Thread-safe.
 Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> words,
-                                              std::span<const rhi::SpecializationConstant> specialization, std::string_view name,
-                                              const LegalizationOptions& options = {});
+                                              std::span<const rhi::SpecializationConstant> specialization,
+                                              std::string_view name, const LegalizationOptions& options = {});
 
 }  // namespace nacre::cpu

@@ -19,7 +19,8 @@ struct Decorations {
     std::optional<spv::BuiltIn> builtin;
     std::optional<std::uint32_t> set, binding, location, spec_id;
     std::uint32_t component = 0, index = 0, array_stride = 0;
-    bool flat = false, no_perspective = false, centroid = false, sample = false, block = false, buffer_block = false, no_contraction = false;
+    bool flat = false, no_perspective = false, centroid = false, sample = false, block = false, buffer_block = false,
+         no_contraction = false;
 };
 struct MemberDecorations {
     std::optional<spv::BuiltIn> builtin;
@@ -84,7 +85,8 @@ void add_unique(std::vector<Id>& list, Id id) {
 std::optional<std::uint32_t> Module::constant_word(Id id) const {
     const Instruction* found = constant(id);
     if (!found) return std::nullopt;
-    if (found->op == Op::OpConstantNull || found->op == Op::OpConstantFalse || found->op == Op::OpSpecConstantFalse) return 0;
+    if (found->op == Op::OpConstantNull || found->op == Op::OpConstantFalse || found->op == Op::OpSpecConstantFalse)
+        return 0;
     if (found->op == Op::OpConstantTrue || found->op == Op::OpSpecConstantTrue) return 1;
     if (found->op != Op::OpConstant && found->op != Op::OpSpecConstant) return std::nullopt;
     const Type& kind = type(found->type);
@@ -161,7 +163,8 @@ void Module::finish_type(Type& type) {
 Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string_view entry_point,
                                spv::ExecutionModel model, std::string_view name) {
     const auto unsupported = [&](std::string reason, std::string remedy) {
-        return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", name), std::move(reason), std::move(remedy));
+        return fail(ErrorCode::unsupported, "compile shader", fmt::format("'{}'", name), std::move(reason),
+                    std::move(remedy));
     };
     Module module;
     for (const Id id : {pointer_word_type, pointer_offset_type}) {
@@ -193,7 +196,8 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
         instruction.operands = at.words.subspan(std::min(first + 1, at.words.size()));
         if (instruction.result && instruction.type) {
             module.result_types_[instruction.result] = instruction.type;
-            if (const auto made = module.types_.find(instruction.type); made != module.types_.end() && made->second.components > max_components)
+            if (const auto made = module.types_.find(instruction.type);
+                made != module.types_.end() && made->second.components > max_components)
                 return unsupported(fmt::format("word {}: a value of {} scalars", at.offset, made->second.components),
                                    fmt::format("At most {} are possible; load a part.", max_components));
         }
@@ -202,7 +206,8 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
             case Op::OpName: names[at.operand(0)] = at.text(1); continue;
             case Op::OpExtInstImport:
                 if (const std::string set = at.text(1); set == "GLSL.std.450") module.glsl_set_ = instruction.result;
-                else if (!set.starts_with("NonSemantic.") && !set.ends_with(".DebugInfo.100")) module.foreign_sets_[instruction.result] = set;
+                else if (!set.starts_with("NonSemantic.") && !set.ends_with(".DebugInfo.100"))
+                    module.foreign_sets_[instruction.result] = set;
                 continue;
             case Op::OpEntryPoint:
                 if (static_cast<spv::ExecutionModel>(at.operand(0)) == model && at.text(2) == entry_point) {
@@ -235,7 +240,8 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
                          static_cast<spv::Decoration>(at.operand(2)), at.operand(3));
                 continue;
             case Op::OpGroupDecorate:
-                for (std::size_t i = 1; i < at.operand_count(); ++i) decorations[at.operand(i)] = decorations[at.operand(0)];
+                for (std::size_t i = 1; i < at.operand_count(); ++i)
+                    decorations[at.operand(i)] = decorations[at.operand(0)];
                 continue;
             case Op::OpTypeForwardPointer: continue;
             default: break;
@@ -249,20 +255,24 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
             case Op::OpTypeVoid: type.kind = TypeKind::void_type; break;
             case Op::OpTypeBool: type.kind = TypeKind::boolean, type.bits = 1; break;
             case Op::OpTypeInt:
-                type.kind = TypeKind::integer, type.bits = instruction.operand(0), type.is_signed = instruction.operand(1) != 0;
+                type.kind = TypeKind::integer, type.bits = instruction.operand(0),
+                type.is_signed = instruction.operand(1) != 0;
                 break;
             case Op::OpTypeFloat: type.kind = TypeKind::floating, type.bits = instruction.operand(0); break;
             case Op::OpTypeVector:
-                type.kind = TypeKind::vector, type.element = instruction.operand(0), type.count = instruction.operand(1);
+                type.kind = TypeKind::vector, type.element = instruction.operand(0),
+                type.count = instruction.operand(1);
                 break;
             case Op::OpTypeMatrix:
-                type.kind = TypeKind::matrix, type.element = instruction.operand(0), type.count = instruction.operand(1);
+                type.kind = TypeKind::matrix, type.element = instruction.operand(0),
+                type.count = instruction.operand(1);
                 break;
             case Op::OpTypeArray: {
                 const auto count = module.constant_word(instruction.operand(1));
                 if (!count)
-                    return unsupported(fmt::format("word {}: the length of an array is no constant of 32 bits", at.offset),
-                                       "Use a constant.");
+                    return unsupported(
+                        fmt::format("word {}: the length of an array is no constant of 32 bits", at.offset),
+                        "Use a constant.");
                 type.kind = TypeKind::array, type.element = instruction.operand(0), type.count = *count;
                 type.array_stride = decorations[type.id].array_stride;
                 break;
@@ -278,9 +288,11 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
                 for (std::uint32_t i = 0; i < instruction.operands.size(); ++i) {
                     Member member;
                     member.type = instruction.operands[i];
-                    if (const auto found = member_decorations.find(key_of(type.id, i)); found != member_decorations.end()) {
+                    if (const auto found = member_decorations.find(key_of(type.id, i));
+                        found != member_decorations.end()) {
                         const MemberDecorations& from = found->second;
-                        member.builtin = from.builtin, member.location = from.location, member.component = from.component;
+                        member.builtin = from.builtin, member.location = from.location,
+                        member.component = from.component;
                         member.offset = from.offset, member.matrix_stride = from.matrix_stride;
                         member.row_major = from.row_major, member.flat = from.flat;
                         member.no_perspective = from.no_perspective, member.centroid = from.centroid;
@@ -305,7 +317,9 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
                 type.sampled = instruction.operand(5);
                 break;
             case Op::OpTypeSampler: type.kind = TypeKind::sampler; break;
-            case Op::OpTypeSampledImage: type.kind = TypeKind::sampled_image, type.element = instruction.operand(0); break;
+            case Op::OpTypeSampledImage:
+                type.kind = TypeKind::sampled_image, type.element = instruction.operand(0);
+                break;
             case Op::OpTypeFunction: type.kind = TypeKind::function, type.element = instruction.operand(0); break;
             case Op::OpTypeAccelerationStructureKHR: type.kind = TypeKind::acceleration_structure; break;
             case Op::OpTypeRayQueryKHR: type.kind = TypeKind::ray_query; break;
@@ -339,14 +353,17 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
                 variable.location = from.location, variable.component = from.component, variable.index = from.index;
                 variable.flat = from.flat, variable.no_perspective = from.no_perspective;
                 variable.centroid = from.centroid, variable.sample = from.sample;
-                if (const auto found = names.find(instruction.result); found != names.end()) variable.name = found->second;
+                if (const auto found = names.find(instruction.result); found != names.end())
+                    variable.name = found->second;
                 // Of buffers only what is loaded takes registers.
-                const bool is_buffer = variable.storage == spv::StorageClass::StorageBuffer || variable.storage == spv::StorageClass::Uniform ||
+                const bool is_buffer = variable.storage == spv::StorageClass::StorageBuffer ||
+                                       variable.storage == spv::StorageClass::Uniform ||
                                        variable.storage == spv::StorageClass::PushConstant;
                 if (!is_buffer && module.type(variable.type).components > max_components)
-                    return unsupported(fmt::format("word {}: variable '{}' holds {} scalars", at.offset, variable.name,
-                                                   module.type(variable.type).components),
-                                       fmt::format("At most {} fit into a variable; use a storage buffer.", max_components));
+                    return unsupported(
+                        fmt::format("word {}: variable '{}' holds {} scalars", at.offset, variable.name,
+                                    module.type(variable.type).components),
+                        fmt::format("At most {} fit into a variable; use a storage buffer.", max_components));
                 module.variables_.emplace(instruction.result, std::move(variable));
                 if (in_block) blocks.back().body.push_back(instruction);
                 continue;
@@ -356,7 +373,8 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
                 blocks.clear();
                 function.id = instruction.result;
                 function.return_type = instruction.type;
-                function.is_kept = (instruction.operand(0) & static_cast<std::uint32_t>(spv::FunctionControlMask::DontInline)) != 0;
+                function.is_kept =
+                    (instruction.operand(0) & static_cast<std::uint32_t>(spv::FunctionControlMask::DontInline)) != 0;
                 in_function = true;
                 continue;
             case Op::OpFunctionParameter: function.parameters.push_back(instruction); continue;
@@ -404,7 +422,8 @@ Expected<Module> Module::parse(std::span<const std::uint32_t> words, std::string
     }
     if (!module.functions_.contains(module.entry_))
         return fail(ErrorCode::shader_compile, "compile shader", fmt::format("'{}'", name),
-                    fmt::format("the module has no entry point '{}' of this stage", entry_point), "Name one that it has.");
+                    fmt::format("the module has no entry point '{}' of this stage", entry_point),
+                    "Name one that it has.");
     for (std::size_t i = 0; i < workgroup_size_ids.size() && i < 3; ++i)
         if (const auto value = module.constant_word(workgroup_size_ids[i])) module.workgroup_size[i] = *value;
     for (const auto& [id, from] : decorations)
@@ -461,8 +480,8 @@ void Module::order_blocks(Function& function, std::vector<Block> blocks) {
     if (blocks.empty()) return;
     std::unordered_map<Id, std::uint32_t> original;
     for (std::uint32_t i = 0; i < blocks.size(); ++i) original.emplace(blocks[i].id, i);
-    // Depth-first search in which a header finishes its merge block first, then its continue target, then what it branches
-    // to; reversed, the order of finishing is the structured order. Iterative: nesting has no limit.
+    // Depth-first search in which a header finishes its merge block first, then its continue target, then what it
+    // branches to; reversed, the order of finishing is the structured order. Iterative: nesting has no limit.
     struct Visit {
         std::uint32_t block;
         std::vector<std::uint32_t> next;
@@ -476,7 +495,8 @@ void Module::order_blocks(Function& function, std::vector<Block> blocks) {
         };
         if (block.merge) add(block.merge);
         if (block.continue_target) add(block.continue_target);
-        for (auto successor = block.successors.rbegin(); successor != block.successors.rend(); ++successor) add(*successor);
+        for (auto successor = block.successors.rbegin(); successor != block.successors.rend(); ++successor)
+            add(*successor);
         return list;
     };
     std::vector<char> seen(blocks.size(), 0);

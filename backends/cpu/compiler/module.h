@@ -15,8 +15,8 @@
 #include "core/error.h"
 
 /// @file
-/// A SPIR-V module, taken apart: types, constants, variables and functions by id. The input is valid (SPIRV-Tools has seen it)
-/// and its specialization constants are frozen.
+/// A SPIR-V module, taken apart: types, constants, variables and functions by id. The input is valid (SPIRV-Tools has
+/// seen it) and its specialization constants are frozen.
 
 namespace nacre::cpu {
 
@@ -48,7 +48,8 @@ struct Type {
     TypeKind kind = TypeKind::void_type;
     std::uint32_t bits = 0;         ///< integer, floating
     bool is_signed = false;
-    Id element = 0;                 ///< vector: scalar; matrix: column; array; pointer: pointee; sampled_image: image; image: sampled type
+    Id element =
+        0;  ///< vector: scalar; matrix: column; array; pointer: pointee; sampled_image: image; image: sampled type
     std::uint32_t count = 0;        ///< vector, matrix, array
     std::uint32_t array_stride = 0; ///< Bytes, of arrays and pointers; 0 where there is no explicit layout.
     spv::StorageClass storage = spv::StorageClass::Function;  ///< pointer
@@ -59,8 +60,8 @@ struct Type {
     spv::Dim dim = spv::Dim::Dim2D;
     bool arrayed = false, multisampled = false;
     std::uint32_t sampled = 0;      ///< 1: with a sampler, 2: storage
-    /// Scalars in a value of this type; 0 for types without values (and for runtime arrays, samplers, images). Pointers into
-    /// buffers and workgroup memory have three: address of the range, its bytes, offset in it.
+    /// Scalars in a value of this type; 0 for types without values (and for runtime arrays, samplers, images). Pointers
+    /// into buffers and workgroup memory have three: address of the range, its bytes, offset in it.
     std::uint32_t components = 0;
     bool has_wide = false;          ///< Some scalar has 64 bits.
     [[nodiscard]] bool is_scalar() const {
@@ -78,7 +79,9 @@ struct Instruction {
     Id result = 0;                             ///< 0 where there is no result.
     std::span<const std::uint32_t> operands;   ///< Behind result type and result.
     std::uint32_t offset = 0;                  ///< In words from the begin of the module.
-    [[nodiscard]] std::uint32_t operand(std::size_t index) const { return index < operands.size() ? operands[index] : 0; }
+    [[nodiscard]] std::uint32_t operand(std::size_t index) const {
+        return index < operands.size() ? operands[index] : 0;
+    }
 };
 
 struct Block {
@@ -164,7 +167,9 @@ class Module {
     }
     [[nodiscard]] bool is_no_contraction(Id id) const { return no_contraction_.contains(id); }
     /// A block of a uniform buffer: decorated Block and not BufferBlock.
-    [[nodiscard]] bool is_uniform_block(Id type) const { return types_.at(type).is_block && !types_.at(type).is_buffer_block; }
+    [[nodiscard]] bool is_uniform_block(Id type) const {
+        return types_.at(type).is_block && !types_.at(type).is_buffer_block;
+    }
     /// Bytes of a value in memory without explicit layout: scalars one after another, booleans as 32 bits.
     [[nodiscard]] std::uint64_t tight_size(Id type) const;
     [[nodiscard]] std::uint64_t tight_offset(Id structure, std::uint32_t member) const;

@@ -8,8 +8,8 @@ namespace nacre::cpu {
 namespace {
 
 /// Appends the scalars of a type and returns the location behind them.
-std::uint32_t append(const Module& module, Id type_id, std::uint32_t location, std::uint32_t component, const InterfaceScalar& how,
-                     std::vector<InterfaceScalar>& list) {
+std::uint32_t append(const Module& module, Id type_id, std::uint32_t location, std::uint32_t component,
+                     const InterfaceScalar& how, std::vector<InterfaceScalar>& list) {
     const Type& type = module.type(type_id);
     switch (type.kind) {
         case TypeKind::vector: {
@@ -22,14 +22,16 @@ std::uint32_t append(const Module& module, Id type_id, std::uint32_t location, s
         }
         case TypeKind::matrix:
         case TypeKind::array:
-            for (std::uint32_t i = 0; i < type.count; ++i) location = append(module, type.element, location, component, how, list);
+            for (std::uint32_t i = 0; i < type.count; ++i)
+                location = append(module, type.element, location, component, how, list);
             return location;
         case TypeKind::structure:
             for (const Member& member : type.members) {
                 InterfaceScalar inner = how;
                 inner.flat |= member.flat, inner.no_perspective |= member.no_perspective;
                 inner.centroid |= member.centroid, inner.sample |= member.sample;
-                location = append(module, member.type, member.location.value_or(location), member.component, inner, list);
+                location =
+                    append(module, member.type, member.location.value_or(location), member.component, inner, list);
             }
             return location;
         default: {
@@ -43,7 +45,8 @@ std::uint32_t append(const Module& module, Id type_id, std::uint32_t location, s
     }
 }
 
-/// First and behind the last of the operands that may be pointers; others may be literals that look like a pointer's id.
+/// First and behind the last of the operands that may be pointers; others may be literals that look like a pointer's
+/// id.
 std::pair<std::size_t, std::size_t> pointer_operands(const Instruction& at) {
     switch (at.op) {
         case spv::Op::OpVariable: return {0, 0};
@@ -75,7 +78,9 @@ bool uses_member(const Module& module, Id variable, std::uint32_t member) {
         for (const Block& block : function.blocks)
             for (const Instruction& at : block.body) {
                 if (at.op == spv::Op::OpAccessChain || at.op == spv::Op::OpInBoundsAccessChain) {
-                    if (at.operand(0) == variable && at.operands.size() > 1 && module.constant_word(at.operand(1)) == member) return true;
+                    if (at.operand(0) == variable && at.operands.size() > 1 &&
+                        module.constant_word(at.operand(1)) == member)
+                        return true;
                     continue;
                 }
                 const auto [first, end] = pointer_operands(at);

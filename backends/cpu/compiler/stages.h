@@ -7,8 +7,8 @@
 #include "backends/cpu/compiler/stage_interface.h"
 
 /// @file
-/// The three stages: each makes the function that the rest of the backend calls, fills the shader's inputs and takes its
-/// outputs. The result is in the LLVM module; `emit` throws EmitError.
+/// The three stages: each makes the function that the rest of the backend calls, fills the shader's inputs and takes
+/// its outputs. The result is in the LLVM module; `emit` throws EmitError.
 
 namespace nacre::cpu {
 
@@ -70,7 +70,8 @@ class FragmentEmitter final : public Emitter {
     struct Place {
         llvm::Value *x = nullptr, *y = nullptr;  ///< Window coordinates of each lane.
     };
-    Component evaluate_plane(std::size_t offset, const Place& place);  ///< Of the plane at a byte offset in PrimitiveData.
+    Component evaluate_plane(std::size_t offset,
+                             const Place& place);  ///< Of the plane at a byte offset in PrimitiveData.
     Component evaluate_input(std::uint32_t index, const Place& place, const Type& scalar);
     Component primitive_word(std::size_t offset, llvm::Type* type);
     Component primitive_double(std::size_t offset);  ///< Of DoublePrimitive.
@@ -78,8 +79,8 @@ class FragmentEmitter final : public Emitter {
     /// `evaluate` for batches of one primitive and for others, whichever the batch is.
     std::vector<llvm::Value*> for_one_or_several(const std::function<std::vector<llvm::Value*>()>& evaluate);
     Place place_at(llvm::Value* inside_x, llvm::Value* inside_y);
-    /// Lanes in which a word of program.inputs is undefined: some vertex of the primitive that has a share in it has not
-    /// written it.
+    /// Lanes in which a word of program.inputs is undefined: some vertex of the primitive that has a share in it has
+    /// not written it.
     llvm::Value* undefined_input(std::uint32_t index);
     Component difference(const Component& value, bool vertical, bool is_fine);
     void emit_batch();
@@ -88,7 +89,8 @@ class FragmentEmitter final : public Emitter {
     void add_stage_values(std::vector<llvm::Value**>& places) override;
     llvm::Value* batch = nullptr;
     std::array<llvm::Value*, max_quads> primitives{};
-    bool is_one_primitive = false;  ///< While code is emitted for batches whose quads all have the first one's primitive.
+    bool is_one_primitive =
+        false;  ///< While code is emitted for batches whose quads all have the first one's primitive.
     llvm::Value *pixel_x = nullptr, *pixel_y = nullptr;  ///< Float, left upper corner of each lane's pixel.
     Place center, centroid;
     /// Four words of each quad's primitive, by their offset, while `keeps_joined_words`: in code without branches.

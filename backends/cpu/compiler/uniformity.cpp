@@ -26,7 +26,8 @@ Uniformity::Uniformity(const Module& module) : module_(module) {
             const Type& type = module.type(variable.type);
             bool divergent = false;
             if (variable.builtin) divergent = is_divergent_builtin(*variable.builtin);
-            else if (type.kind == TypeKind::structure && !type.members.empty() && type.members[0].builtin) divergent = true;
+            else if (type.kind == TypeKind::structure && !type.members.empty() && type.members[0].builtin)
+                divergent = true;
             else divergent = true;
             if (divergent) content_[id] = 1;
         }
@@ -70,9 +71,9 @@ Id Uniformity::root_of(Id pointer) const {
 
 /// Marks what a divergent branch at the end of `block` does to the blocks that its lanes reach before they meet again.
 ///
-/// Follows the lanes in the order in which blocks run. Each way that lanes took has a label; where two labels come together
-/// lanes join, with different values. As long as lanes wait anywhere else, be it at a later block, for the next iteration of
-/// a loop or, in a function that is called, for its end, the block that runs is partial.
+/// Follows the lanes in the order in which blocks run. Each way that lanes took has a label; where two labels come
+/// together lanes join, with different values. As long as lanes wait anywhere else, be it at a later block, for the
+/// next iteration of a loop or, in a function that is called, for its end, the block that runs is partial.
 void Uniformity::spread(const Function& function, std::uint32_t block) {
     constexpr std::uint32_t none = ~0u;
     const auto count = static_cast<std::uint32_t>(function.blocks.size());
@@ -183,7 +184,8 @@ void Uniformity::visit(const Instruction& at, Id block) {
             for (std::size_t i = 0; i < callee.parameters.size(); ++i) {
                 const Id argument = at.operand(i + 1), parameter = callee.parameters[i].result;
                 const Type& type = module_.type(callee.parameters[i].type);
-                if (type.kind == TypeKind::pointer && (type.storage == StorageClass::Function || type.storage == StorageClass::Private)) {
+                if (type.kind == TypeKind::pointer &&
+                    (type.storage == StorageClass::Function || type.storage == StorageClass::Private)) {
                     // Who writes through the parameter is not followed back to the variable: it counts as divergent.
                     mark(divergent_, parameter);
                     if (const Id root = root_of(argument)) mark(content_, root);
@@ -199,7 +201,8 @@ void Uniformity::visit(const Instruction& at, Id block) {
         case Op::OpExtInst: {
             const std::uint32_t number = at.operand(1);
             // An input at a place in each pixel; its pointer and the place are uniform.
-            const bool interpolates = module_.is_glsl_set(at.operand(0)) && number >= GLSLstd450InterpolateAtCentroid && number <= GLSLstd450InterpolateAtOffset;
+            const bool interpolates = module_.is_glsl_set(at.operand(0)) && number >= GLSLstd450InterpolateAtCentroid &&
+                                      number <= GLSLstd450InterpolateAtOffset;
             if (interpolates || any_operand(2)) mark(divergent_, at.result);
             // modf and frexp write through a pointer.
             if (module_.is_glsl_set(at.operand(0)) && at.operands.size() > 3)
@@ -209,7 +212,8 @@ void Uniformity::visit(const Instruction& at, Id block) {
         }
         case Op::OpImageFetch:
             // What textures hold does not change while a shader runs; the third operand is a mask of those behind it.
-            if (is_divergent(at.operand(0)) || is_divergent(at.operand(1)) || any_operand(3)) mark(divergent_, at.result);
+            if (is_divergent(at.operand(0)) || is_divergent(at.operand(1)) || any_operand(3))
+                mark(divergent_, at.result);
             return;
         case Op::OpImageSampleImplicitLod: case Op::OpImageSampleExplicitLod: case Op::OpImageSampleDrefImplicitLod:
         case Op::OpImageSampleDrefExplicitLod: case Op::OpImageSampleProjImplicitLod:
@@ -247,7 +251,8 @@ void Uniformity::visit(const Instruction& at, Id block) {
         case Op::OpGroupNonUniformFMax: case Op::OpGroupNonUniformBitwiseAnd: case Op::OpGroupNonUniformBitwiseOr:
         case Op::OpGroupNonUniformBitwiseXor: case Op::OpGroupNonUniformLogicalAnd:
         case Op::OpGroupNonUniformLogicalOr: case Op::OpGroupNonUniformLogicalXor:
-            if (static_cast<spv::GroupOperation>(at.operand(1)) != spv::GroupOperation::Reduce) mark(divergent_, at.result);
+            if (static_cast<spv::GroupOperation>(at.operand(1)) != spv::GroupOperation::Reduce)
+                mark(divergent_, at.result);
             return;
         case Op::OpGroupNonUniformBallotBitCount:
             if (is_divergent(at.operand(2)) ||
@@ -281,7 +286,8 @@ void Uniformity::analyze(const Function& function) {
         const Block& block = function.blocks[index];
         for (const Instruction& phi : block.phis) {
             bool divergent = divergent_join_[block.id] != 0;
-            for (std::size_t i = 0; i < phi.operands.size(); i += 2) divergent = divergent || is_divergent(phi.operands[i]);
+            for (std::size_t i = 0; i < phi.operands.size(); i += 2)
+                divergent = divergent || is_divergent(phi.operands[i]);
             if (divergent) mark(divergent_, phi.result);
         }
         for (const Instruction& instruction : block.body) visit(instruction, block.id);
@@ -289,8 +295,8 @@ void Uniformity::analyze(const Function& function) {
         if (end.op == Op::OpReturnValue && is_divergent(end.operand(0))) mark(divergent_return_, function.id);
         if (has_divergent_branch(function, index)) spread(function, index);
     }
-    // Values that are uniform in a loop differ behind it where lanes leave it one by one. Who uses them there sees different
-    // values; the definition itself stays uniform.
+    // Values that are uniform in a loop differ behind it where lanes leave it one by one. Who uses them there sees
+    // different values; the definition itself stays uniform.
     for (std::uint32_t header = 0; header < function.blocks.size(); ++header) {
         if (!function.blocks[header].continue_target || !has_divergent_exit(function.blocks[header].id)) continue;
         const std::uint32_t end = end_of_construct(function, header);

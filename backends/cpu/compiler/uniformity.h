@@ -7,12 +7,14 @@
 #include "backends/cpu/compiler/module.h"
 
 /// @file
-/// Which values are equal in all lanes, so that one scalar does for all of them; and where control flow takes lanes apart.
+/// Which values are equal in all lanes, so that one scalar does for all of them; and where control flow takes lanes
+/// apart.
 ///
-/// A value is *uniform* if all lanes that execute its definition together get the same. That holds inside of a loop from which
-/// lanes leave one by one too (all lanes that are left have gone round equally often); used behind such a loop the value
-/// differs (`differs_outside`). Sources: "whole-function vectorization" (Karrenberg and Hack 2011) and divergence analysis
-/// with sync dependence (Coutinho et al. 2011; Rosemann et al. 2021), in the form that structured control flow allows.
+/// A value is *uniform* if all lanes that execute its definition together get the same. That holds inside of a loop
+/// from which lanes leave one by one too (all lanes that are left have gone round equally often); used behind such a
+/// loop the value differs (`differs_outside`). Sources: "whole-function vectorization" (Karrenberg and Hack 2011) and
+/// divergence analysis with sync dependence (Coutinho et al. 2011; Rosemann et al. 2021), in the form that structured
+/// control flow allows.
 
 namespace nacre::cpu {
 

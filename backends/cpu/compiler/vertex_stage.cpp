@@ -26,8 +26,11 @@ Component VertexEmitter::fetch(const std::string& name, const rhi::VertexAttribu
     if (component >= format.channels) return default_value();
     const rhi::VertexBufferLayout& layout = input_.buffers[attribute.buffer];
     const std::size_t binding = offsetof(VertexDraw, buffers) + attribute.buffer * sizeof(VertexBufferBinding);
-    llvm::Value* data = invariant_load(pointer_type, at_offset(draw, static_cast<std::int64_t>(binding + offsetof(VertexBufferBinding, data))), 8);
-    llvm::Value* size = invariant_load(builder.getInt64Ty(), at_offset(draw, static_cast<std::int64_t>(binding + offsetof(VertexBufferBinding, size))), 8);
+    llvm::Value* data = invariant_load(
+        pointer_type, at_offset(draw, static_cast<std::int64_t>(binding + offsetof(VertexBufferBinding, data))), 8);
+    llvm::Value* size =
+        invariant_load(builder.getInt64Ty(),
+                       at_offset(draw, static_cast<std::int64_t>(binding + offsetof(VertexBufferBinding, size))), 8);
 
     // A format's bits as words: which one holds the channel, and where in it.
     struct Channel {
@@ -54,7 +57,8 @@ Component VertexEmitter::fetch(const std::string& name, const rhi::VertexAttribu
     llvm::Value* wide = widened(element);
     llvm::Type* wide_type = wide->getType();
     const auto wide_constant = [&](std::uint64_t value) { return llvm::ConstantInt::get(wide_type, value); };
-    llvm::Value* begin = builder.CreateAdd(builder.CreateMul(wide, wide_constant(layout.stride)), wide_constant(attribute.offset));
+    llvm::Value* begin =
+        builder.CreateAdd(builder.CreateMul(wide, wide_constant(layout.stride)), wide_constant(attribute.offset));
     llvm::Value* end = builder.CreateAdd(begin, wide_constant(bytes));
     llvm::Value* fits = builder.CreateICmpULE(end, is_fixed ? size : splat(size));
     const std::int64_t extra = channel.word * 4;
@@ -66,7 +70,8 @@ Component VertexEmitter::fetch(const std::string& name, const rhi::VertexAttribu
         // 32-bit offsets where they are in range keep to the hardware's gather.
         llvm::Value* offsets = builder.CreateTrunc(begin, vector_of(word));
         llvm::Value* addresses_of = builder.CreateGEP(builder.getInt8Ty(), at_offset(data, extra), offsets);
-        bits = builder.CreateMaskedGather(vector_of(word), addresses_of, llvm::Align(1), fits, llvm::Constant::getNullValue(vector_of(word)));
+        bits = builder.CreateMaskedGather(vector_of(word), addresses_of, llvm::Align(1), fits,
+                                          llvm::Constant::getNullValue(vector_of(word)));
     }
     const auto constant_word = [&](std::uint32_t value) { return llvm::ConstantInt::get(bits->getType(), value); };
     const auto float_type = [&]() { return like(bits, real_type()); };
@@ -93,16 +98,19 @@ Component VertexEmitter::fetch(const std::string& name, const rhi::VertexAttribu
     const bool is_signed = format.kind == FormatKind::sint || format.kind == FormatKind::snorm;
     if (channel.bits < 32) {
         if (is_signed) {
-            bits = builder.CreateAShr(builder.CreateShl(bits, constant_word(32 - channel.shift - channel.bits)), constant_word(32 - channel.bits));
+            bits = builder.CreateAShr(builder.CreateShl(bits, constant_word(32 - channel.shift - channel.bits)),
+                                      constant_word(32 - channel.bits));
         } else {
-            bits = builder.CreateAnd(builder.CreateLShr(bits, constant_word(channel.shift)), constant_word((1u << channel.bits) - 1));
+            bits = builder.CreateAnd(builder.CreateLShr(bits, constant_word(channel.shift)),
+                                     constant_word((1u << channel.bits) - 1));
         }
     }
     switch (format.kind) {
         case FormatKind::uint:
         case FormatKind::sint:
             if (is_integer) return to_result(bits);
-            return to_result(is_signed ? builder.CreateSIToFP(bits, float_type()) : builder.CreateUIToFP(bits, float_type()));
+            return to_result(is_signed ? builder.CreateSIToFP(bits, float_type())
+                                       : builder.CreateUIToFP(bits, float_type()));
         case FormatKind::floating:
             if (channel.bits == 16) return to_result(math.half_to_float(bits));
             if (is_integer) return to_result(bits);
@@ -126,11 +134,13 @@ Component VertexEmitter::fetch(const std::string& name, const rhi::VertexAttribu
         case FormatKind::unorm:
         case FormatKind::srgb: {
             const double most = channel.bits == 32 ? 4294967295.0 : (1u << channel.bits) - 1;
-            return to_result(builder.CreateFDiv(builder.CreateUIToFP(bits, float_type()), llvm::ConstantFP::get(float_type(), most)));
+            return to_result(builder.CreateFDiv(builder.CreateUIToFP(bits, float_type()),
+                                                llvm::ConstantFP::get(float_type(), most)));
         }
         case FormatKind::snorm: {
             const double most = (1u << (channel.bits - 1)) - 1;
-            llvm::Value* value = builder.CreateFDiv(builder.CreateSIToFP(bits, float_type()), llvm::ConstantFP::get(float_type(), most));
+            llvm::Value* value =
+                builder.CreateFDiv(builder.CreateSIToFP(bits, float_type()), llvm::ConstantFP::get(float_type(), most));
             return to_result(math.f_max(value, llvm::ConstantFP::get(float_type(), -1)));
         }
     }
@@ -151,14 +161,17 @@ std::vector<Component> VertexEmitter::input_components(const Variable& variable)
             case BuiltIn::DrawIndex: return {draw_word(offsetof(VertexDraw, draw_index))};
             case BuiltIn::ViewIndex:
             case BuiltIn::DeviceIndex: return {Component(int32(0))};
-            default: reject(fmt::format("built-in input {} is not supported in vertex shaders", static_cast<unsigned>(*variable.builtin)));
+            default:
+                reject(fmt::format("built-in input {} is not supported in vertex shaders",
+                                   static_cast<unsigned>(*variable.builtin)));
         }
     }
     const auto scalars = interface_scalars(module, variable);
     if (!scalars) reject(fmt::format("input '{}' has no location", variable.name));
     std::vector<Component> made;
     for (const InterfaceScalar& at : *scalars) {
-        if (at.is_wide) reject(fmt::format("input '{}' holds 64-bit values, of which no vertex format is made", variable.name));
+        if (at.is_wide)
+            reject(fmt::format("input '{}' holds 64-bit values, of which no vertex format is made", variable.name));
         const auto attribute = std::ranges::find(input_.attributes, at.location, &rhi::VertexAttribute::location);
         if (attribute == input_.attributes.end()) made.push_back(zero(module.type(at.type)));
         else
@@ -172,7 +185,8 @@ void VertexEmitter::store_outputs() {
     llvm::Value* doubles =
         in_double() ? invariant_load(pointer_type, at_offset(batch, offsetof(VertexBatch, doubles)), 8) : nullptr;
     const auto put = [&](std::uint32_t slot, const Component& value) {
-        builder.CreateAlignedStore(widen(to_word(value)), at_offset(outputs, std::int64_t{slot} * max_lanes * 4), llvm::Align(64));
+        builder.CreateAlignedStore(widen(to_word(value)), at_offset(outputs, std::int64_t{slot} * max_lanes * 4),
+                                   llvm::Align(64));
         if (value.value->getType()->getScalarType()->isDoubleTy())
             builder.CreateAlignedStore(widen(value), at_offset(doubles, std::int64_t{slot} * max_lanes * 8),
                                        llvm::Align(64));
@@ -278,9 +292,12 @@ void VertexEmitter::emit() {
 }
 
 void VertexEmitter::emit_batch() {
-    indices = builder.CreateAlignedLoad(vector_of(builder.getInt32Ty()), at_offset(batch, offsetof(VertexBatch, indices)), llvm::Align(4));
-    instance = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(VertexBatch, instance)), llvm::Align(4));
-    llvm::Value* count = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(VertexBatch, count)), llvm::Align(4));
+    indices = builder.CreateAlignedLoad(vector_of(builder.getInt32Ty()),
+                                        at_offset(batch, offsetof(VertexBatch, indices)), llvm::Align(4));
+    instance = builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(VertexBatch, instance)),
+                                         llvm::Align(4));
+    llvm::Value* count =
+        builder.CreateAlignedLoad(builder.getInt32Ty(), at_offset(batch, offsetof(VertexBatch, count)), llvm::Align(4));
     // Lanes behind the last vertex repeat one; only what they write must not be seen.
     live_slot = make_slot(mask_type, "live");
     store_live(builder.CreateICmpULT(lane_numbers(), splat(count)));

@@ -25,8 +25,8 @@ NACRE_LANES_INLINE void store_planes(Plane* planes, Float4 c, Float4 dx, Float4 
     store4(&planes[0].c, c), store4(&planes[1].c, dx), store4(&planes[2].c, dy), store4(&planes[3].c, rest);
 }
 
-/// The slopes of values at three vertices, as factors of value 0 - value 1 and value 2 - value 0: in single precision and in the order
-/// of operations of Mesa's software drivers, whose interpolated values come out bit for bit.
+/// The slopes of values at three vertices, as factors of value 0 - value 1 and value 2 - value 0: in single precision
+/// and in the order of operations of Mesa's software drivers, whose interpolated values come out bit for bit.
 struct WindowSlopes {
     float dx01, dy01, dx20, dy20;  ///< Differences of window coordinates over twice the area.
     float x0, y0;                  ///< Of vertex 0, from the center of pixel (0, 0).

@@ -82,9 +82,9 @@ struct RasterizerOptions {
 
 /// Carries out the draws of render passes, one after another, on the threads of a scheduler. Not thread-safe.
 ///
-/// Draws are collected and run together, in their order. DrawState and DrawCall are copied with the push constants; what they
-/// point to beyond that (pipelines, descriptors, buffers, the execution state) stays as it is until `end_pass` or
-/// `passed_samples` returns.
+/// Draws are collected and run together, in their order. DrawState and DrawCall are copied with the push constants;
+/// what they point to beyond that (pipelines, descriptors, buffers, the execution state) stays as it is until
+/// `end_pass` or `passed_samples` returns.
 class Rasterizer {
   public:
     Rasterizer(Scheduler& scheduler, std::uint32_t lanes, const RasterizerOptions& options = {});

@@ -9,8 +9,8 @@
 #include "backends/cpu/rays/ray_query.h"
 
 /// @file
-/// All that differs between versions of Embree. This is version 3; version 4 takes the filter and the flags of a call as
-/// RTCIntersectArguments instead of members of a context, and needs no more than another body for these functions.
+/// All that differs between versions of Embree. This is version 3; version 4 takes the filter and the flags of a call
+/// as RTCIntersectArguments instead of members of a context, and needs no more than another body for these functions.
 
 namespace nacre::cpu::embree {
 

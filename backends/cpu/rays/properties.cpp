@@ -16,7 +16,8 @@ void transform(const std::array<float, 12>& matrix, const float (&vector)[3], fl
                       matrix[row * 4 + 3] * w;
 }
 
-void find_property(const RayQueryLanes* query_pointer, std::uint32_t wanted, std::uint32_t live, std::uint32_t* result) {
+void find_property(const RayQueryLanes* query_pointer, std::uint32_t wanted, std::uint32_t live,
+                   std::uint32_t* result) {
     const RayQueryLanes& query = *query_pointer;
     const bool is_committed = (wanted & ray_property_committed) != 0;
     const auto property = static_cast<RayProperty>(wanted & ~ray_property_committed);
@@ -47,7 +48,8 @@ void find_property(const RayQueryLanes* query_pointer, std::uint32_t wanted, std
             case RayProperty::front_face: {
                 const auto& normal = is_committed ? query.normal : query.candidate_normal;
                 transform(instance.to_object, direction, 0.0f, vector);
-                const float cosine = vector[0] * normal[0][lane] + vector[1] * normal[1][lane] + vector[2] * normal[2][lane];
+                const float cosine =
+                    vector[0] * normal[0][lane] + vector[1] * normal[1][lane] + vector[2] * normal[2][lane];
                 put(0, lane, std::uint32_t{(cosine < 0) != has_any(instance.flags, rhi::InstanceFlags::flip_facing)});
                 break;
             }

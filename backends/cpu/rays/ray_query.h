@@ -7,10 +7,11 @@
 #include "backends/cpu/shader_interface.h"
 
 /// @file
-/// Ray queries as compiled shaders and this part see them: one object for each variable of type rayQueryEXT, with the state of all
-/// lanes, and the functions that compiled code calls.
+/// Ray queries as compiled shaders and this part see them: one object for each variable of type rayQueryEXT, with the
+/// state of all lanes, and the functions that compiled code calls.
 ///
-/// Members up to `instance` lie as in Embree's RTCRayHit16, so that most queries are one call of Embree on this very memory.
+/// Members up to `instance` lie as in Embree's RTCRayHit16, so that most queries are one call of Embree on this very
+/// memory.
 
 namespace nacre::cpu {
 
@@ -98,7 +99,8 @@ enum class RayProperty : std::uint32_t {
     world_to_object,
 };
 inline constexpr std::uint32_t most_property_words = 12;
-inline constexpr std::uint32_t ray_property_committed = 256;  ///< Added to a RayProperty: of the committed hit, not the candidate.
+inline constexpr std::uint32_t ray_property_committed =
+    256;  ///< Added to a RayProperty: of the committed hit, not the candidate.
 
 /// What compiled code knows of the lanes that begin, for `RayProceedFunction`. Flags of any of their rays are added,
 /// from the bit `ray_flags_shift` on.

@@ -56,7 +56,8 @@ Expected<std::shared_ptr<RayDevice>> RayDevice::create(std::uint32_t threads, co
                     "Reinstall Embree 3.");
     const auto has = [&](RTCDeviceProperty property) { return rtcGetDeviceProperty(made->device_, property) != 0; };
     if (!has(RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) || !has(RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED))
-        return fail(ErrorCode::unsupported, "open Embree", "libembree3", "it was built without ray masks or filter functions",
+        return fail(ErrorCode::unsupported, "open Embree", "libembree3",
+                    "it was built without ray masks or filter functions",
                     "Use an Embree with EMBREE_RAY_MASK and EMBREE_FILTER_FUNCTION, as Debian's.");
     if (has(RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) made->packet_width_ = 8;
     if (has(RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) made->packet_width_ = 16;
@@ -164,7 +165,8 @@ void RayMesh::fill_triangles(std::size_t index, const RayGeometrySource& source,
     auto* positions = static_cast<float*>(rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_VERTEX, 0));
     auto* triangles = static_cast<std::uint32_t*>(rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_INDEX, 0));
     if (!positions || !triangles) throw std::bad_alloc();
-    // Vertices that cannot be, become the first that can; triangles with one of them shrink to a point, which nothing hits.
+    // Vertices that cannot be, become the first that can; triangles with one of them shrink to a point, which nothing
+    // hits.
     std::vector<bool> is_bad;
     float stand_in[3] = {0, 0, 0};
     bool has_stand_in = false;
@@ -174,7 +176,8 @@ void RayMesh::fill_triangles(std::size_t index, const RayGeometrySource& source,
         bool is_good = at + 12 <= source.vertex_bytes;
         if (is_good) {
             std::memcpy(position, source.vertices + at, 12);
-            for (int axis = 0; axis < 3; ++axis) is_good = is_good && std::abs(position[axis]) <= largest_vertex_coordinate;
+            for (int axis = 0; axis < 3; ++axis)
+                is_good = is_good && std::abs(position[axis]) <= largest_vertex_coordinate;
         }
         if (!is_good) {
             if (is_bad.empty()) is_bad.resize(desc.vertex_count);

@@ -12,8 +12,8 @@
 #include "rhi/acceleration_structure.h"
 
 /// @file
-/// Acceleration structures as scenes of Embree. Positions are copied when a structure is built: what happens to the buffers later does
-/// not matter, and what is not finite never reaches Embree.
+/// Acceleration structures as scenes of Embree. Positions are copied when a structure is built: what happens to the
+/// buffers later does not matter, and what is not finite never reaches Embree.
 ///
 ///     NACRE_TRY(auto rays, RayDevice::create(threads));
 ///     auto mesh = std::make_shared<RayMesh>(rays, std::vector{rhi::GeometryDesc{...}}, false, prefer);

@@ -86,7 +86,8 @@ void collect(const RTCFilterFunctionNArguments* arguments) {
         if (arguments->valid[i] == 0) continue;
         const std::uint32_t lane = RTCRayN_id(arguments->ray, arguments->N, i);
         if (lane >= max_lanes) continue;
-        if (keep(call.query.candidates[lane], call.query.candidate_count[lane], candidate_of(*arguments, i)) == Kept::no_room)
+        if (keep(call.query.candidates[lane], call.query.candidate_count[lane], candidate_of(*arguments, i)) ==
+            Kept::no_room)
             call.query.has_more[lane] = 1;
         arguments->valid[i] = 0;
     }

@@ -46,7 +46,8 @@ TEST(TexelRows, DecodeEveryCodeAsSingleTexelsAre) {
         for (std::uint32_t at = 0; at < count; ++at) {
             const Texel one = decode_texel(format, texels.data() + std::size_t{at} * bytes);
             for (std::size_t c = 0; c < 4; ++c) {
-                const float expected = is_unorm_byte(format, c) ? std::round(one.f[c] * 255) * (1.0f / 255.0f) : one.f[c];
+                const float expected =
+                    is_unorm_byte(format, c) ? std::round(one.f[c] * 255) * (1.0f / 255.0f) : one.f[c];
                 ASSERT_TRUE(row[at][c] == expected || (std::isnan(row[at][c]) && std::isnan(expected)))
                     << rhi::info(format).name << " texel " << at << ": " << row[at][c] << " and " << expected;
             }

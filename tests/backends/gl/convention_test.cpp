@@ -35,8 +35,11 @@ Drawn draw(Device& device, const Picture& picture) {
     Texture depth;
     GraphicsPipelineDesc desc = picture.pipeline;
     if (picture.depth) {
-        depth = expect(device.create_texture({.format = Format::d32_float, .width = picture.width,
-            .height = picture.height, .usage = TextureUsage::depth_target | TextureUsage::copy_source, .name = "depth"}));
+        depth = expect(device.create_texture({.format = Format::d32_float,
+                                              .width = picture.width,
+                                              .height = picture.height,
+                                              .usage = TextureUsage::depth_target | TextureUsage::copy_source,
+                                              .name = "depth"}));
         desc.depth_stencil.format = Format::d32_float;
     }
     desc.vertex = make_shader(device, "picture.vert", picture.vertex);
@@ -94,7 +97,8 @@ class GlConventionTest : public GlTest {
         EXPECT_EQ(differing, 0u) << "first at x " << first / 4 % picture.width << ", y " << first / 4 / picture.width
                                  << ", channel " << first % 4 << ": expected " << std::hex << wanted.color[first]
                                  << ", found " << found.color[first];
-        const bool drawn = std::ranges::any_of(found.color, [](std::uint32_t value) { return value != 0 && value != ~0u; });
+        const bool drawn =
+            std::ranges::any_of(found.color, [](std::uint32_t value) { return value != 0 && value != ~0u; });
         EXPECT_TRUE(drawn) << "the picture is empty";
         return found;
     }
@@ -220,7 +224,8 @@ void main() { result = uvec4(value, 1, 2, 3); }
     for (IndexType type : {IndexType::uint16, IndexType::uint32}) {
         std::array<Buffer, 2> indices;
         for (std::size_t i = 0; i < 2; ++i) {
-            indices[i] = expect(devices[i]->create_buffer({.size = 256, .usage = BufferUsage::index, .name = "indices"}));
+            indices[i] =
+                expect(devices[i]->create_buffer({.size = 256, .usage = BufferUsage::index, .name = "indices"}));
             std::array<std::uint16_t, 128> narrow{};
             std::array<std::uint32_t, 64> wide{};
             for (std::uint32_t k = 0; k < 64; ++k) narrow[k] = wide[k] = k * 7 % 59;
@@ -271,12 +276,13 @@ void main() { result = uvec4(1, 2, 3, 4); }
         const Drawn wanted = draw(*reference_device(), picture);
         const Drawn found = draw(*device_, picture);
         ASSERT_EQ(wanted.depth.size(), found.depth.size());
-        // OpenGL ES starts the interpolation at another vertex, and without clip control depth takes a detour from -1 to
-        // 1: both cost a few of its last bits.
+        // OpenGL ES starts the interpolation at another vertex, and without clip control depth takes a detour from -1
+        // to 1: both cost a few of its last bits.
         const bool exact = std::string_view(GetParam().backend) != "gles";
         float largest = 0.0f;
         for (std::size_t i = 0; i < wanted.depth.size(); ++i)
-            largest = std::max(largest, std::abs(std::bit_cast<float>(wanted.depth[i]) - std::bit_cast<float>(found.depth[i])));
+            largest = std::max(largest,
+                               std::abs(std::bit_cast<float>(wanted.depth[i]) - std::bit_cast<float>(found.depth[i])));
         if (exact)
             EXPECT_EQ(wanted.depth, found.depth) << "largest difference " << largest;
         else
@@ -439,7 +445,8 @@ void main() {
             .usage = TextureUsage::sampled | TextureUsage::copy_destination, .name = "cube"}));
         for (std::uint32_t face = 0; face < 6; ++face) {
             std::vector<std::uint32_t> values(16);
-            for (std::uint32_t i = 0; i < 16; ++i) values[i] = face * 40 | (i % 4 * 60) << 8 | (i / 4 * 60) << 16 | 0xff000000;
+            for (std::uint32_t i = 0; i < 16; ++i)
+                values[i] = face * 40 | (i % 4 * 60) << 8 | (i / 4 * 60) << 16 | 0xff000000;
             expect(device.write_texture(source, std::as_bytes(std::span(values)), 0, face));
         }
         const Sampler nearest = expect(device.create_sampler({.magnify = Filter::nearest, .minify = Filter::nearest,

@@ -30,8 +30,10 @@ TEST_P(GlDeviceTest, ComputesIntoABuffer) {
     constexpr std::uint32_t count = 1000;
     std::vector<std::uint32_t> values(count);
     std::iota(values.begin(), values.end(), 7u);
-    const Buffer source = expect(device_->create_buffer({.size = count * 4, .usage = BufferUsage::storage, .name = "in"}));
-    const Buffer result = expect(device_->create_buffer({.size = count * 4, .usage = BufferUsage::storage, .name = "out"}));
+    const Buffer source =
+        expect(device_->create_buffer({.size = count * 4, .usage = BufferUsage::storage, .name = "in"}));
+    const Buffer result =
+        expect(device_->create_buffer({.size = count * 4, .usage = BufferUsage::storage, .name = "out"}));
     expect(device_->write_buffer(source, std::span<const std::uint32_t>(values)));
     const ComputePipeline pipeline = expect(device_->create_compute_pipeline(
         {.shader = make_shader(*device_, "double.comp", double_values), .name = "double"}));

@@ -27,7 +27,8 @@ bool computes(Device& device, std::uint32_t value) {
     constexpr std::uint32_t count = 256;
     const auto buffer = device.create_buffer({.size = count * 4, .usage = BufferUsage::storage, .name = "result"});
     if (!buffer) return false;
-    const auto pipeline = device.create_compute_pipeline({.shader = make_shader(device, "fill.comp", fill), .name = "fill"});
+    const auto pipeline =
+        device.create_compute_pipeline({.shader = make_shader(device, "fill.comp", fill), .name = "fill"});
     if (!pipeline) return false;
     const auto group = device.create_bind_group({.layout = expect(device.bind_group_layout(*pipeline, 0)),
                                                  .entries = {{.binding = 0, .buffer = *buffer}}});
@@ -68,7 +69,8 @@ INSTANTIATE_TEST_SUITE_P(All, GlFaultTest, testing::ValuesIn(device_kinds), name
 TEST_P(GlFaultTest, ReportsALostDeviceAndMakesAnother) {
     auto device = make_device(GetParam(), {.faults = {.lose_device = 2}});
     if (!device) return;
-    const Buffer buffer = expect(device->create_buffer({.size = 64, .usage = BufferUsage::copy_destination, .name = "buffer"}));
+    const Buffer buffer =
+        expect(device->create_buffer({.size = 64, .usage = BufferUsage::copy_destination, .name = "buffer"}));
     expect(device->write_buffer(buffer, std::as_bytes(std::span("abcd", 4))));
     std::uint32_t submissions = 0;
     ErrorCode code = ErrorCode::internal;
@@ -109,8 +111,12 @@ TEST_P(GlFaultTest, SurvivesEveryFailingAllocation) {
         };
         const auto buffer = device->create_buffer({.size = 64, .usage = BufferUsage::storage, .name = "buffer"});
         count(buffer);
-        const auto texture = device->create_texture({.format = Format::rgba8_unorm, .width = 4, .height = 4,
-            .usage = TextureUsage::sampled | TextureUsage::copy_destination | TextureUsage::copy_source, .name = "texture"});
+        const auto texture = device->create_texture(
+            {.format = Format::rgba8_unorm,
+             .width = 4,
+             .height = 4,
+             .usage = TextureUsage::sampled | TextureUsage::copy_destination | TextureUsage::copy_source,
+             .name = "texture"});
         count(texture);
         if (buffer) count(device->write_buffer(*buffer, std::as_bytes(std::span("abcd", 4))));
         if (buffer) count(device->read_buffer(*buffer));
@@ -182,8 +188,8 @@ TEST_P(GlFaultTest, WorksBesideOtherDevicesAndThreads) {
 }
 
 TEST(GlMessages, ReachTheCallback) {
-    // Silence of the driver's checks means nothing unless a wrong call makes them speak: here one that the front end would
-    // have refused.
+    // Silence of the driver's checks means nothing unless a wrong call makes them speak: here one that the front end
+    // would have refused.
     std::atomic<std::uint32_t> errors{0};
     const DeviceDesc desc{.backend = "gl", .driver_validation = true};
     auto backend = gl::make_backend();
@@ -193,7 +199,8 @@ TEST(GlMessages, ReachTheCallback) {
     if (!device && device.error().code == ErrorCode::not_found) GTEST_SKIP() << device.error().message();
     ASSERT_TRUE(device) << device.error().message();
     auto first = expect((*device)->create_buffer({.size = 64, .usage = BufferUsage::copy_source, .name = "small"}));
-    auto second = expect((*device)->create_buffer({.size = 64, .usage = BufferUsage::copy_destination, .name = "small"}));
+    auto second =
+        expect((*device)->create_buffer({.size = 64, .usage = BufferUsage::copy_destination, .name = "small"}));
     CommandStream stream;
     auto& copy = stream.append<CopyBufferCommand>();
     copy.source.object = first.get();
@@ -211,7 +218,8 @@ TEST(GlBackends, RefuseModesAndDevicesThatTheyDoNotHave) {
     for (const char* backend : {"gles:osmesa", "gl:glx"}) {
         const auto device = instance().create_device({.backend = backend});
         ASSERT_FALSE(device) << backend;
-        EXPECT_THAT(device.error().message(), testing::HasSubstr(std::string(backend).substr(std::string(backend).find(':') + 1)));
+        EXPECT_THAT(device.error().message(),
+                    testing::HasSubstr(std::string(backend).substr(std::string(backend).find(':') + 1)));
     }
     const auto device = instance().create_device({.backend = "gl", .adapter = 77});
     ASSERT_FALSE(device);

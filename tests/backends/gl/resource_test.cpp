@@ -7,8 +7,8 @@
 #include "tests/backends/gl/gl_device.h"
 
 /// @file
-/// How shaders see resources that OpenGL has in another form: push constants, specialization constants, separate textures
-/// and samplers, views, storage images, blending.
+/// How shaders see resources that OpenGL has in another form: push constants, specialization constants, separate
+/// textures and samplers, views, storage images, blending.
 
 namespace nacre::rhi {
 namespace {
@@ -25,10 +25,14 @@ class GlResourceTest : public GlTest {
     std::vector<std::uint32_t> compute(Device& device, const std::string& text, std::uint32_t count,
                                        std::vector<BindGroupEntry> entries = {},
                                        std::span<const std::byte> push_constants = {},
-                                       std::vector<SpecializationConstant> specialization = {}, std::uint32_t groups = 1) {
-        const Buffer result = expect(device.create_buffer({.size = count * 4, .usage = BufferUsage::storage | BufferUsage::copy_destination, .name = "result"}));
-        const ComputePipeline pipeline = expect(device.create_compute_pipeline(
-            {.shader = make_shader(device, "test.comp", text), .specialization = std::move(specialization), .name = "test"}));
+                                       std::vector<SpecializationConstant> specialization = {},
+                                       std::uint32_t groups = 1) {
+        const Buffer result = expect(device.create_buffer(
+            {.size = count * 4, .usage = BufferUsage::storage | BufferUsage::copy_destination, .name = "result"}));
+        const ComputePipeline pipeline =
+            expect(device.create_compute_pipeline({.shader = make_shader(device, "test.comp", text),
+                                                   .specialization = std::move(specialization),
+                                                   .name = "test"}));
         if (!pipeline) return {};
         entries.push_back({.binding = 0, .buffer = result});
         const BindGroup group = expect(device.create_bind_group(
@@ -76,7 +80,8 @@ void main() {
     for (std::uint32_t i = 0; i < constants.size(); ++i)
         constants[i] = std::bit_cast<std::uint32_t>(static_cast<float>(i) + 0.5f);
     constants[18] = static_cast<std::uint32_t>(-7), constants[22] = 9, constants[24] = 0x80000001u;
-    const std::array<std::uint32_t, 22> places{0, 1, 2, 3, 4, 6, 8, 10, 7, 9, 11, 12, 13, 14, 15, 16, 17, 18, 20, 21, 22, 24};
+    const std::array<std::uint32_t, 22> places{0,  1,  2,  3,  4,  6,  8,  10, 7,  9,  11,
+                                               12, 13, 14, 15, 16, 17, 18, 20, 21, 22, 24};
     std::vector<std::uint32_t> wanted;
     for (std::uint32_t place : places) wanted.push_back(constants[place]);
     EXPECT_EQ(compute(*device_, text, 22, {}, bytes_of(constants)), wanted);
@@ -87,24 +92,29 @@ TEST_P(GlResourceTest, KeepsPushConstantsOfTwoStagesApart) {
     const Texture target = expect(device_->create_texture({.format = Format::rgba32_uint, .width = 8, .height = 8,
         .usage = TextureUsage::color_target | TextureUsage::copy_source, .name = "target"}));
     // Blocks and members of one name that mean different things in the two stages.
-    const GraphicsPipeline pipeline = expect(device_->create_graphics_pipeline({.vertex = make_shader(*device_, "a.vert", R"(
+    const GraphicsPipeline pipeline =
+        expect(device_->create_graphics_pipeline({.vertex = make_shader(*device_, "a.vert", R"(
 layout(push_constant) uniform Parameters { layout(offset = 0) vec4 value; } parameters;
 layout(set = 0, binding = 0) uniform Block { vec4 offset; } block;
 void main() {
     gl_Position = vec4(gl_VertexIndex == 1 ? 3.0 : -1.0, gl_VertexIndex == 2 ? 3.0 : -1.0, 0.5, 1.0) * parameters.value.x +
                   block.offset;
-})"), .fragment = make_shader(*device_, "a.frag", R"(
+})"),
+                                                  .fragment = make_shader(*device_, "a.frag", R"(
 layout(push_constant) uniform Parameters { layout(offset = 16) uvec2 value; } parameters;
 layout(set = 0, binding = 1) uniform Block { uvec4 offset; } block;
 layout(location = 0) out uvec4 result;
 void main() { result = uvec4(parameters.value, 5, 6) + block.offset; }
-)"), .color_targets = {{.format = Format::rgba32_uint}}, .name = "two stages"}));
+)"),
+                                                  .color_targets = {{.format = Format::rgba32_uint}},
+                                                  .name = "two stages"}));
     const Buffer zero = expect(device_->create_buffer({.size = 16, .usage = BufferUsage::uniform, .name = "zero"}));
     const Buffer one = expect(device_->create_buffer({.size = 16, .usage = BufferUsage::uniform, .name = "one"}));
     expect(device_->write_buffer(zero, bytes_of(std::array<float, 4>{})));
     expect(device_->write_buffer(one, bytes_of(std::array<std::uint32_t, 4>{1, 1, 1, 1})));
-    const BindGroup group = expect(device_->create_bind_group({.layout = expect(device_->bind_group_layout(pipeline, 0)),
-        .entries = {{.binding = 0, .buffer = zero}, {.binding = 1, .buffer = one}}}));
+    const BindGroup group = expect(
+        device_->create_bind_group({.layout = expect(device_->bind_group_layout(pipeline, 0)),
+                                    .entries = {{.binding = 0, .buffer = zero}, {.binding = 1, .buffer = one}}}));
     CommandList list = device_->create_command_list();
     list.begin_render_pass({.color = {{.view = target, .load = LoadOperation::clear}}});
     list.set_pipeline(pipeline);
@@ -184,16 +194,35 @@ void main() {
 
 TEST_P(GlResourceTest, StoresAndLoadsImagesOfEveryFormat) {
     if (!has_device()) return;
-    const std::vector<std::pair<Format, const char*>> qualifiers{
-        {Format::r8_unorm, "r8"}, {Format::r8_snorm, "r8_snorm"}, {Format::r8_uint, "r8ui"}, {Format::r8_sint, "r8i"},
-        {Format::rg8_unorm, "rg8"}, {Format::rg8_uint, "rg8ui"}, {Format::rgba8_unorm, "rgba8"},
-        {Format::rgba8_snorm, "rgba8_snorm"}, {Format::rgba8_uint, "rgba8ui"}, {Format::rgba8_sint, "rgba8i"},
-        {Format::r16_unorm, "r16"}, {Format::r16_uint, "r16ui"}, {Format::r16_float, "r16f"}, {Format::rg16_float, "rg16f"},
-        {Format::rgba16_unorm, "rgba16"}, {Format::rgba16_uint, "rgba16ui"}, {Format::rgba16_sint, "rgba16i"},
-        {Format::rgba16_float, "rgba16f"}, {Format::r32_uint, "r32ui"}, {Format::r32_sint, "r32i"},
-        {Format::r32_float, "r32f"}, {Format::rg32_uint, "rg32ui"}, {Format::rg32_float, "rg32f"},
-        {Format::rgba32_uint, "rgba32ui"}, {Format::rgba32_sint, "rgba32i"}, {Format::rgba32_float, "rgba32f"},
-        {Format::rgb10a2_unorm, "rgb10_a2"}, {Format::rgb10a2_uint, "rgb10_a2ui"}, {Format::rg11b10_float, "r11f_g11f_b10f"}};
+    const std::vector<std::pair<Format, const char*>> qualifiers{{Format::r8_unorm, "r8"},
+                                                                 {Format::r8_snorm, "r8_snorm"},
+                                                                 {Format::r8_uint, "r8ui"},
+                                                                 {Format::r8_sint, "r8i"},
+                                                                 {Format::rg8_unorm, "rg8"},
+                                                                 {Format::rg8_uint, "rg8ui"},
+                                                                 {Format::rgba8_unorm, "rgba8"},
+                                                                 {Format::rgba8_snorm, "rgba8_snorm"},
+                                                                 {Format::rgba8_uint, "rgba8ui"},
+                                                                 {Format::rgba8_sint, "rgba8i"},
+                                                                 {Format::r16_unorm, "r16"},
+                                                                 {Format::r16_uint, "r16ui"},
+                                                                 {Format::r16_float, "r16f"},
+                                                                 {Format::rg16_float, "rg16f"},
+                                                                 {Format::rgba16_unorm, "rgba16"},
+                                                                 {Format::rgba16_uint, "rgba16ui"},
+                                                                 {Format::rgba16_sint, "rgba16i"},
+                                                                 {Format::rgba16_float, "rgba16f"},
+                                                                 {Format::r32_uint, "r32ui"},
+                                                                 {Format::r32_sint, "r32i"},
+                                                                 {Format::r32_float, "r32f"},
+                                                                 {Format::rg32_uint, "rg32ui"},
+                                                                 {Format::rg32_float, "rg32f"},
+                                                                 {Format::rgba32_uint, "rgba32ui"},
+                                                                 {Format::rgba32_sint, "rgba32i"},
+                                                                 {Format::rgba32_float, "rgba32f"},
+                                                                 {Format::rgb10a2_unorm, "rgb10_a2"},
+                                                                 {Format::rgb10a2_uint, "rgb10_a2ui"},
+                                                                 {Format::rg11b10_float, "r11f_g11f_b10f"}};
     std::uint32_t tried = 0;
     for (const auto& [format, qualifier] : qualifiers) {
         if (!device_->capabilities().supports(format, FormatSupport::storage_image)) continue;
@@ -235,7 +264,8 @@ void main() {{
 }}
 )", prefix, facts.is_integer() ? "" : "/ 0.25");
         const std::vector<std::uint32_t> wanted{0, 1, 2, 3, 0, 1, 2, 3};
-        EXPECT_EQ(compute(*device_, load, 8, {{.binding = 1, .texture = TextureView::subresource(image, 0, 2)}}), wanted);
+        EXPECT_EQ(compute(*device_, load, 8, {{.binding = 1, .texture = TextureView::subresource(image, 0, 2)}}),
+                  wanted);
         EXPECT_EQ(compute(*device_, fetch, 8, {{.binding = 1, .texture = image}}), wanted);
     }
     EXPECT_GE(tried, std::string_view(GetParam().backend) == "gles" ? 10u : 25u);
@@ -288,7 +318,8 @@ TEST_P(GlResourceTest, ShowsTwoRangesOfMipsOrSaysThatItCannot) {
         const std::vector<std::uint32_t> values((8u >> mip) * (8u >> mip), 0xff000000u | mip);
         expect(device_->write_texture(texture, std::as_bytes(std::span(values)), mip));
     }
-    const ComputePipeline pipeline = expect(device_->create_compute_pipeline({.shader = make_shader(*device_, "a.comp", R"(
+    const ComputePipeline pipeline =
+        expect(device_->create_compute_pipeline({.shader = make_shader(*device_, "a.comp", R"(
 #extension GL_EXT_samplerless_texture_functions : require
 layout(local_size_x = 1) in;
 layout(set = 0, binding = 0) writeonly buffer Result { uint result[]; };
@@ -298,7 +329,8 @@ void main() {
     result[0] = uint(texelFetch(fine, ivec2(0), 0).r * 255.0 + 0.5);
     result[1] = uint(texelFetch(coarse, ivec2(0), 0).r * 255.0 + 0.5);
 }
-)"), .name = "two ranges"}));
+)"),
+                                                 .name = "two ranges"}));
     const Buffer result = expect(device_->create_buffer({.size = 8, .usage = BufferUsage::storage}));
     TextureView fine(texture), coarse(texture);
     fine.mip_count = 2;
@@ -306,8 +338,10 @@ void main() {
     // Refused by the front end or by the backend, but never drawn wrong.
     device_->set_message_callback([](const Message&) {});
     const auto group = device_->create_bind_group({.layout = expect(device_->bind_group_layout(pipeline, 0)),
-        .entries = {{.binding = 0, .buffer = result}, {.binding = 1, .texture = fine}, {.binding = 2, .texture = coarse}},
-        .name = "two ranges"});
+                                                   .entries = {{.binding = 0, .buffer = result},
+                                                               {.binding = 1, .texture = fine},
+                                                               {.binding = 2, .texture = coarse}},
+                                                   .name = "two ranges"});
     if (!device_->capabilities().texture_view_formats) {
         ASSERT_FALSE(group);
         EXPECT_THAT(group.error().message(), testing::HasSubstr("chain"));
@@ -335,8 +369,13 @@ TEST_P(GlResourceTest, BlendsAsVulkanDoes) {
     };
     const BlendState over{true, BlendFactor::source_alpha, BlendFactor::one_minus_source_alpha, BlendOperation::add,
                           BlendFactor::one, BlendFactor::one_minus_source_alpha, BlendOperation::add};
-    const BlendState constant{true, BlendFactor::constant_color, BlendFactor::one_minus_constant_color,
-                              BlendOperation::reverse_subtract, BlendFactor::zero, BlendFactor::one, BlendOperation::maximum};
+    const BlendState constant{true,
+                              BlendFactor::constant_color,
+                              BlendFactor::one_minus_constant_color,
+                              BlendOperation::reverse_subtract,
+                              BlendFactor::zero,
+                              BlendFactor::one,
+                              BlendOperation::maximum};
     const BlendState dual{true, BlendFactor::one, BlendFactor::source1_color, BlendOperation::add,
                           BlendFactor::one, BlendFactor::one_minus_source1_alpha, BlendOperation::add};
     for (const Case& test : {Case{"same for both", true, {over, over}}, Case{"constant", true, {constant, constant}},
@@ -363,8 +402,12 @@ void main() { first = vec4(gl_FragCoord.xy / 16.0, 0.3, 0.5); second = vec4(0.9,
 )"), .name = test.name};
             std::vector<Texture> textures;
             for (std::size_t k = 0; k < targets; ++k) {
-                textures.push_back(expect(device.create_texture({.format = Format::rgba8_unorm, .width = 16, .height = 16,
-                    .usage = TextureUsage::color_target | TextureUsage::copy_source, .name = "target"})));
+                textures.push_back(
+                    expect(device.create_texture({.format = Format::rgba8_unorm,
+                                                  .width = 16,
+                                                  .height = 16,
+                                                  .usage = TextureUsage::color_target | TextureUsage::copy_source,
+                                                  .name = "target"})));
                 pass.color.push_back({.view = textures[k], .load = LoadOperation::clear,
                                       .clear = {.floating = {0.2f, 0.6f, 0.8f, 0.4f}}});
                 desc.color_targets.push_back({Format::rgba8_unorm, test.blends[k], test.masks[k]});
@@ -391,7 +434,8 @@ TEST_P(GlResourceTest, TestsStencilAndBiasesDepthAsVulkanDoes) {
     if (!reference_device()) GTEST_SKIP() << "there is no Vulkan device to compare with";
     for (Format format : {Format::d32_float_s8_uint, Format::d24_unorm_s8_uint}) {
         const auto needed = FormatSupport::depth_target;
-        if (!device_->capabilities().supports(format, needed) || !reference_device()->capabilities().supports(format, needed))
+        if (!device_->capabilities().supports(format, needed) ||
+            !reference_device()->capabilities().supports(format, needed))
             continue;
         SCOPED_TRACE(info(format).name);
         std::array<std::vector<std::uint32_t>, 2> colors;

@@ -94,11 +94,17 @@ TEST_P(GlTransferTest, KeepsEveryFormatInEveryDimension) {
         descs.push_back({.format = format, .width = 20, .height = 12, .mips = 3, .usage = usage, .name = "2d"});
         descs.push_back({.format = format, .width = 12, .height = 8, .layers = 3, .usage = usage, .name = "2d array"});
         if (!facts.is_depth_stencil() && !facts.is_compressed()) {
-            descs.push_back({.dimension = TextureDimension::d1, .format = format, .width = 19, .usage = usage, .name = "1d"});
+            descs.push_back(
+                {.dimension = TextureDimension::d1, .format = format, .width = 19, .usage = usage, .name = "1d"});
             descs.push_back({.dimension = TextureDimension::d3, .format = format, .width = 6, .height = 5, .depth = 4,
                              .usage = usage, .name = "3d"});
-            descs.push_back({.dimension = TextureDimension::cube, .format = format, .width = 8, .height = 8, .layers = 6,
-                             .usage = usage, .name = "cube"});
+            descs.push_back({.dimension = TextureDimension::cube,
+                             .format = format,
+                             .width = 8,
+                             .height = 8,
+                             .layers = 6,
+                             .usage = usage,
+                             .name = "cube"});
         }
         for (const TextureDesc& desc : descs) {
             SCOPED_TRACE(std::string(facts.name) + " " + desc.name);
@@ -112,7 +118,8 @@ TEST_P(GlTransferTest, KeepsEveryFormatInEveryDimension) {
                     const auto wanted = random_content(desc, mip, mip * 10 + layer);
                     if (format == Format::d24_unorm_s8_uint && is_es()) {
                         // Read as a float, which has no bit to spare for 24 bits.
-                        const auto steps = as_values<std::uint32_t>(found), wanted_steps = as_values<std::uint32_t>(wanted);
+                        const auto steps = as_values<std::uint32_t>(found),
+                                   wanted_steps = as_values<std::uint32_t>(wanted);
                         for (std::size_t at = 0; at < steps.size(); ++at)
                             ASSERT_LE(std::abs(static_cast<int>(steps[at]) - static_cast<int>(wanted_steps[at])), 1);
                         continue;
@@ -129,8 +136,14 @@ TEST_P(GlTransferTest, CopiesPartsWithPaddedRows) {
     if (!has_device()) return;
     for (Format format : {Format::rgba8_unorm, Format::r32_uint, Format::rg16_float, Format::r32_float}) {
         SCOPED_TRACE(info(format).name);
-        const TextureDesc desc{.format = format, .width = 16, .height = 16, .layers = 2, .mips = 2,
-            .usage = TextureUsage::sampled | TextureUsage::copy_source | TextureUsage::copy_destination, .name = "part"};
+        const TextureDesc desc{
+            .format = format,
+            .width = 16,
+            .height = 16,
+            .layers = 2,
+            .mips = 2,
+            .usage = TextureUsage::sampled | TextureUsage::copy_source | TextureUsage::copy_destination,
+            .name = "part"};
         std::array<std::vector<std::byte>, 2> found;
         const std::array devices{reference_device(), device_.get()};
         if (!devices[0]) GTEST_SKIP() << "there is no Vulkan device to compare with";
@@ -142,7 +155,8 @@ TEST_P(GlTransferTest, CopiesPartsWithPaddedRows) {
             std::vector<float> values(1024);
             for (std::size_t k = 0; k < values.size(); ++k) values[k] = static_cast<float>(k % 61) * 0.25f;
             if (format == Format::rg16_float)
-                for (float& value : values) value = std::bit_cast<float>(0x3c003800u + std::bit_cast<std::uint32_t>(value) % 512);
+                for (float& value : values)
+                    value = std::bit_cast<float>(0x3c003800u + std::bit_cast<std::uint32_t>(value) % 512);
             expect(device.write_buffer(source, std::span<const float>(values)));
             CommandList list = device.create_command_list();
             list.clear_texture(first, {});
@@ -154,8 +168,13 @@ TEST_P(GlTransferTest, CopiesPartsWithPaddedRows) {
             list.fill_buffer(result, 0xabcdef01);
             list.copy_texture_to_buffer(first, result, {.buffer_offset = 16, .bytes_per_row = 80, .mip = 0, .layer = 1,
                 .offset = {1, 2, 0}, .extent = {14, 12, 1}});
-            list.copy_texture_to_buffer(second, result, {.buffer_offset = 4096, .bytes_per_row = 48, .mip = 1, .layer = 0,
-                .offset = {0, 1, 0}, .extent = {8, 7, 1}});
+            list.copy_texture_to_buffer(second, result,
+                                        {.buffer_offset = 4096,
+                                         .bytes_per_row = 48,
+                                         .mip = 1,
+                                         .layer = 0,
+                                         .offset = {0, 1, 0},
+                                         .extent = {8, 7, 1}});
             expect(device.submit(std::move(list)));
             found[i] = expect(device.read_buffer(result));
         }
@@ -181,8 +200,14 @@ TEST_P(GlTransferTest, ClearsEveryFormatToVulkansBits) {
             color.sint = {-3, 70, -100, 1};
         else
             color.floating = {0.2f, 0.75f, 0.0625f, 1.0f};
-        const TextureDesc desc{.format = format, .width = 6, .height = 4, .layers = 2, .mips = 2,
-            .usage = TextureUsage::sampled | TextureUsage::copy_source | TextureUsage::copy_destination, .name = "clear"};
+        const TextureDesc desc{
+            .format = format,
+            .width = 6,
+            .height = 4,
+            .layers = 2,
+            .mips = 2,
+            .usage = TextureUsage::sampled | TextureUsage::copy_source | TextureUsage::copy_destination,
+            .name = "clear"};
         std::array<std::vector<std::byte>, 2> found;
         const std::array devices{reference_device(), device_.get()};
         for (std::size_t k = 0; k < 2; ++k) {
@@ -246,14 +271,18 @@ TEST_P(GlTransferTest, ResolvesToVulkansBits) {
             .usage = TextureUsage::color_target, .name = "samples"}));
         const Texture one = expect(device.create_texture({.format = format, .width = 48, .height = 40,
             .usage = TextureUsage::color_target | TextureUsage::copy_source, .name = "resolved"}));
-        const GraphicsPipeline pipeline = expect(device.create_graphics_pipeline({.vertex = make_shader(device, "a.vert", R"(
+        const GraphicsPipeline pipeline =
+            expect(device.create_graphics_pipeline({.vertex = make_shader(device, "a.vert", R"(
 void main() {
     const vec2 corners[3] = vec2[](vec2(-0.93, -0.81), vec2(0.87, -0.4), vec2(-0.2, 0.9));
     gl_Position = vec4(corners[gl_VertexIndex], 0.5, 1.0);
-})"), .fragment = make_shader(device, "a.frag", R"(
+})"),
+                                                    .fragment = make_shader(device, "a.frag", R"(
 layout(location = 0) out vec4 result;
 void main() { result = vec4(1.0, 0.5, 0.25, 1.0); }
-)"), .samples = 4, .color_targets = {{.format = format}}}));
+)"),
+                                                    .samples = 4,
+                                                    .color_targets = {{.format = format}}}));
         CommandList list = device.create_command_list();
         list.begin_render_pass({.color = {{.view = many, .load = LoadOperation::clear, .store = StoreOperation::discard,
                                            .clear = {.floating = {0, 0, 0.5f, 1}}, .resolve = one}}});
@@ -271,12 +300,15 @@ TEST_P(GlTransferTest, CountsSamplesAndTime) {
     const Capabilities& capabilities = device_->capabilities();
     const Texture target = expect(device_->create_texture({.format = Format::rgba8_unorm, .width = 16, .height = 16,
         .usage = TextureUsage::color_target, .name = "target"}));
-    const GraphicsPipeline pipeline = expect(device_->create_graphics_pipeline({.vertex = make_shader(*device_, "a.vert", R"(
+    const GraphicsPipeline pipeline =
+        expect(device_->create_graphics_pipeline({.vertex = make_shader(*device_, "a.vert", R"(
 void main() { gl_Position = vec4(gl_VertexIndex == 1 ? 3.0 : -1.0, gl_VertexIndex == 2 ? 3.0 : -1.0, 0.5, 1.0); }
-)"), .fragment = make_shader(*device_, "a.frag", R"(
+)"),
+                                                  .fragment = make_shader(*device_, "a.frag", R"(
 layout(location = 0) out vec4 result;
 void main() { result = vec4(1.0); }
-)"), .color_targets = {{.format = Format::rgba8_unorm}}}));
+)"),
+                                                  .color_targets = {{.format = Format::rgba8_unorm}}}));
     const QueryPool occlusion = expect(device_->create_query_pool({.type = QueryType::occlusion, .count = 2}));
     QueryPool times;
     if (capabilities.timestamps) times = expect(device_->create_query_pool({.type = QueryType::timestamp, .count = 2}));

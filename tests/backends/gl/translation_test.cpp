@@ -48,7 +48,9 @@ layout(set = 2, binding = 5) uniform Camera { mat4 view; } camera;
 layout(location = 0) in vec3 position;
 layout(location = 0) out vec2 uv;
 void main() { gl_Position = camera.view * vec4(position, 1.0); uv = position.xy * fma(position.x, 2.0, float(gl_InstanceIndex)); }
-)", rhi::ShaderStage::vertex), {}, es_minimum(), slots);
+)",
+                                              rhi::ShaderStage::vertex),
+                                  {}, es_minimum(), slots);
     ASSERT_TRUE(vertex) << vertex.error().message();
     EXPECT_THAT(vertex->source, testing::StartsWith("#version 310 es\n"));
     EXPECT_THAT(vertex->source, Not(HasSubstr(": require")));
@@ -69,8 +71,9 @@ void main() { result = texture(sampler2D(color, smooth_), uv) + vec4(gl_PointCoo
 
 TEST(GlTranslation, LeavesDepthAloneWithClipControl) {
     SlotAllocator slots;
-    const auto vertex = translate(make_shader("a.vert", "void main() { gl_Position = vec4(0.5); }", rhi::ShaderStage::vertex),
-                                  {}, desktop(), slots);
+    const auto vertex =
+        translate(make_shader("a.vert", "void main() { gl_Position = vec4(0.5); }", rhi::ShaderStage::vertex), {},
+                  desktop(), slots);
     ASSERT_TRUE(vertex) << vertex.error().message();
     EXPECT_THAT(vertex->source, testing::StartsWith("#version 450\n"));
     EXPECT_THAT(vertex->source, Not(HasSubstr("gl_Position.z =")));

@@ -40,7 +40,8 @@ bool draws_checkers(nacre::rhi::Device& device) {
     nacre::materials::MaterialDescription material{.name = "checker"};
     material.custom = std::make_shared<Checker>();
     scene.materials.push_back(material);
-    scene.meshes.push_back({.name = "sheet", .primitives = {nacre::scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0})}});
+    scene.meshes.push_back(
+        {.name = "sheet", .primitives = {nacre::scene::parallelogram({-1, -1, 0}, {2, 0, 0}, {0, 2, 0})}});
     scene.instances.push_back({.name = "sheet", .mesh = 0, .transforms = {glm::mat4(1.0f)}});
     nacre::scene::Camera camera;
     camera.world[3] = glm::vec4(0.0f, 0.0f, 2.0f, 1.0f);
@@ -70,7 +71,8 @@ int main() {
     backends.push_back(nacre::cpu::make_backend());
     const nacre::rhi::Instance instance(std::move(backends));
     for (const auto& adapter : instance.adapters()) std::cout << adapter.backend << ": " << adapter.name << '\n';
-    for (const auto& missing : instance.unavailable()) std::cout << missing.backend << ": " << missing.error.message() << '\n';
+    for (const auto& missing : instance.unavailable())
+        std::cout << missing.backend << ": " << missing.error.message() << '\n';
     const auto device = instance.create_device({.backend = "cpu"});
     if (!device) {
         std::cout << device.error().message() << '\n';

@@ -29,8 +29,8 @@ struct MathOptions {
     /// The target takes numbers apart and scales them by powers of two by instructions (AVX-512 F and VL): less code
     /// for exponentials and logarithms, within the same bounds of error.
     bool exponent_instructions = false;
-    /// The target converts single precision to unsigned 32-bit integers by an instruction that gives the largest one for
-    /// what is larger (AVX-512 F and VL). Results are the same bits.
+    /// The target converts single precision to unsigned 32-bit integers by an instruction that gives the largest one
+    /// for what is larger (AVX-512 F and VL). Results are the same bits.
     bool conversion_instructions = false;
 };
 

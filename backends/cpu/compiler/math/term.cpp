@@ -171,8 +171,9 @@ Term exponent_of(const Term& x) {
 Term significand_of(const Term& x) {
     constexpr std::uint32_t from_one_to_two = 0, negative_is_nan = 2 << 2;
     using namespace llvm::Intrinsic;
-    return for_all_lanes({x86_avx512_mask_getmant_ps_128, x86_avx512_mask_getmant_ps_256, x86_avx512_mask_getmant_ps_512},
-                         {x.value(), x.builder().getInt32(from_one_to_two | negative_is_nan)}, x, x.element());
+    return for_all_lanes(
+        {x86_avx512_mask_getmant_ps_128, x86_avx512_mask_getmant_ps_256, x86_avx512_mask_getmant_ps_512},
+        {x.value(), x.builder().getInt32(from_one_to_two | negative_is_nan)}, x, x.element());
 }
 
 Term times_power_of_two(const Term& x, const Term& exponent) {
@@ -190,8 +191,8 @@ bool has_conversion_instructions(const Term& x) {
 Term to_unsigned(const Term& x) {
     using namespace llvm::Intrinsic;
     return for_all_lanes(
-        {x86_avx512_mask_cvttps2udq_128, x86_avx512_mask_cvttps2udq_256, x86_avx512_mask_cvttps2udq_512}, {x.value()}, x,
-        x.builder().getInt32Ty());
+        {x86_avx512_mask_cvttps2udq_128, x86_avx512_mask_cvttps2udq_256, x86_avx512_mask_cvttps2udq_512}, {x.value()},
+        x, x.builder().getInt32Ty());
 }
 
 Rounded round_to_whole(const Term& x) {

@@ -45,7 +45,8 @@ NACRE_INLINE CubeProjection<W> project_to_cube(const Floats<W>* direction) {
         constexpr auto minus = static_cast<std::int32_t>(0x80000000u);
         const std::int32_t outward = (first & 1) != 0 ? minus : 0;
         cube.major = absolute<W>(along);
-        cube.sc = first < 2 ? signed_by(direction[2], minus ^ outward) : signed_by(direction[0], first > 3 ? outward : 0);
+        cube.sc =
+            first < 2 ? signed_by(direction[2], minus ^ outward) : signed_by(direction[0], first > 3 ? outward : 0);
         cube.tc = first < 2 || first > 3 ? signed_by(direction[1], minus) : signed_by(direction[2], outward);
     } else {
         face_components<W>(cube.face, direction, cube.sc, cube.tc, cube.major);

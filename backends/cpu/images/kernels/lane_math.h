@@ -117,8 +117,8 @@ NACRE_INLINE Floats<W> fraction(Floats<W> x) {
     return small - floor_small<W>(small);
 }
 
-/// Logarithm to base 2, linear between the powers of two: too small by up to 0.0861. x >= 0; 0 and NaN (whose bits differ
-/// between machines) give -127, infinity gives 128.
+/// Logarithm to base 2, linear between the powers of two: too small by up to 0.0861. x >= 0; 0 and NaN (whose bits
+/// differ between machines) give -127, infinity gives 128.
 template <int W>
 NACRE_INLINE Floats<W> linear_log2(Floats<W> x) {
     const Floats<W> result = to_floats<W>((Ints<W>)x - 0x3f800000) * 0x1p-23f;

@@ -62,7 +62,8 @@ NACRE_INLINE void level_of_detail(const Invocation& call, const Floats<W>* coord
             length_y = length_y + y * y;
         }
         const Floats<W> longest = maximum<W>(length_x, length_y);
-        // The specification leaves the precision of the logarithm to the implementation; Mesa's software drivers take this one.
+        // The specification leaves the precision of the logarithm to the implementation; Mesa's software drivers take
+        // this one.
         lambda = 0.5f * linear_log2<W>(longest);
         if (call.sampler->is_elliptical && sampler.max_anisotropy > 1.0f && axes == 2 && spatial == 2 &&
             !call.has(image_compare)) {

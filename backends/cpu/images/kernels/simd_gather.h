@@ -172,9 +172,9 @@ NACRE_INLINE Ints<W> gather_small_texels(const std::byte* base, Ints<W> offset, 
 }
 
 #ifdef __AVX512VBMI__
-/// table[byte] for the three lower bytes of each lane, from a table of 256 floats that is kept by bytes: byte k of entry
-/// i at 256 * k + i, aligned to 64. Permutations of registers look up all channels of all lanes at once, which takes a
-/// fifth of the time of gathers.
+/// table[byte] for the three lower bytes of each lane, from a table of 256 floats that is kept by bytes: byte k of
+/// entry i at 256 * k + i, aligned to 64. Permutations of registers look up all channels of all lanes at once, which
+/// takes a fifth of the time of gathers.
 template <int W>
 NACRE_INLINE void look_up_three_bytes(const std::byte* table, Ints<W> word, Floats<W>* out) {
     __m512i codes;
@@ -196,7 +196,8 @@ NACRE_INLINE void look_up_three_bytes(const std::byte* table, Ints<W> word, Floa
         bytes[k] = _mm512_mask_blend_epi8(is_upper, lower, upper);
     }
     const __m512i low_01 = _mm512_unpacklo_epi8(bytes[0], bytes[1]), low_23 = _mm512_unpacklo_epi8(bytes[2], bytes[3]);
-    const __m512i high_01 = _mm512_unpackhi_epi8(bytes[0], bytes[1]), high_23 = _mm512_unpackhi_epi8(bytes[2], bytes[3]);
+    const __m512i high_01 = _mm512_unpackhi_epi8(bytes[0], bytes[1]),
+                  high_23 = _mm512_unpackhi_epi8(bytes[2], bytes[3]);
     const __m512i channels[3] = {_mm512_unpacklo_epi16(low_01, low_23), _mm512_unpackhi_epi16(low_01, low_23),
                                  _mm512_unpacklo_epi16(high_01, high_23)};
     for (int c = 0; c < 3; ++c) {

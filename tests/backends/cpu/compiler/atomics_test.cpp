@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Atomic operations whose old values nobody asks for, which are done once for all lanes that mean one place: in memory of
-// the workgroup and in buffers, at one place and at several, with one operand and with one for each invocation.
+// Atomic operations whose old values nobody asks for, which are done once for all lanes that mean one place: in memory
+// of the workgroup and in buffers, at one place and at several, with one operand and with one for each invocation.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -55,15 +55,20 @@ TEST_P(UnaskedAtomics, LeaveWhatOneInvocationAfterTheOtherWould) {
     const std::string type = operation.is_signed ? "int" : "uint", memory = is_shared ? "own" : "result";
     const std::string text = R"(
         layout(local_size_x = 64) in;
-        layout(set = 0, binding = 0, std430) buffer Result { )" + type + R"( result[]; };
+        layout(set = 0, binding = 0, std430) buffer Result { )" +
+                             type + R"( result[]; };
         shared )" + type + R"( own[8];
         void main() {
             uint i = gl_LocalInvocationIndex;
-            if (i < 8u) own[i] = result[i] = )" + type + R"((12345u + i);
+            if (i < 8u) own[i] = result[i] = )" +
+                             type + R"((12345u + i);
             memoryBarrier(); barrier();
-            if (i % 7u != 2u) )" + operation.function + "(" + memory + "[" + place.glsl + "], " + type + "(" + value.glsl + R"());
+            if (i % 7u != 2u) )" +
+                             operation.function + "(" + memory + "[" + place.glsl + "], " + type + "(" + value.glsl +
+                             R"());
             memoryBarrier(); barrier();
-            if (i < 8u) result[i] = )" + memory + R"([i];
+            if (i < 8u) result[i] = )" +
+                             memory + R"([i];
         })";
     std::vector<std::uint32_t> expected(8);
     for (std::uint32_t i = 0; i < 8; ++i) expected[i] = 12345 + i;

@@ -14,7 +14,8 @@ namespace nacre::cpu {
 Expected<std::vector<std::uint32_t>> ComputeRunner::run(std::vector<std::uint32_t> spirv) const {
     rhi::Instance instance(all_backends());
     NACRE_TRY(auto device, instance.create_device({.backend = spec}));
-    NACRE_TRY(const auto shader, device->create_shader({.spirv = std::move(spirv), .stage = rhi::ShaderStage::compute, .name = "test"}));
+    NACRE_TRY(const auto shader,
+              device->create_shader({.spirv = std::move(spirv), .stage = rhi::ShaderStage::compute, .name = "test"}));
     NACRE_TRY(const auto pipeline, device->create_compute_pipeline({.shader = shader, .name = "test"}));
     NACRE_TRY(const auto layout, device->bind_group_layout(pipeline, 0));
     NACRE_TRY(const auto result, device->create_buffer({.size = result_words * 4, .usage = rhi::BufferUsage::storage}));

@@ -21,12 +21,15 @@ class ControlFlow : public testing::TestWithParam<const char*> {
   public:
     /// Runs `body`, which sets `uint r` from `int id`, for 64 invocations. `n` is a buffer with 0, 1, 2, ...
     std::vector<std::uint32_t> evaluate(const std::string& declarations, const std::string& body) {
-        const std::string text = R"(
+        const std::string text =
+            R"(
             layout(local_size_x = 64) in;
             layout(set = 0, binding = 0) buffer Result { uint result[64]; };
             layout(set = 0, binding = 1) readonly buffer Numbers { int n[64]; };
-            )" + declarations + "\nvoid main() { int id = n[gl_LocalInvocationIndex]; uint r = 7777u; result[id] = 12345u;\n" + body +
-                                 "\nresult[id] = r; }\n";
+            )" +
+            declarations +
+            "\nvoid main() { int id = n[gl_LocalInvocationIndex]; uint r = 7777u; result[id] = 12345u;\n" + body +
+            "\nresult[id] = r; }\n";
         rhi::Instance instance(all_backends());
         auto device = instance.create_device({.backend = GetParam()});
         rhi::ShaderCompiler compiler({});
@@ -44,7 +47,9 @@ class ControlFlow : public testing::TestWithParam<const char*> {
         EXPECT_TRUE((*device)->write_buffer(*input, std::span<const std::int32_t>(numbers)));
         const auto layout = (*device)->bind_group_layout(*pipeline, 0);
         const auto group = (*device)->create_bind_group(
-            {.layout = *layout, .entries = {{.binding = 0, .buffer = *result}, {.binding = 1, .buffer = *input}}, .name = "control flow"});
+            {.layout = *layout,
+             .entries = {{.binding = 0, .buffer = *result}, {.binding = 1, .buffer = *input}},
+             .name = "control flow"});
         rhi::CommandList list = (*device)->create_command_list("control flow");
         list.set_pipeline(*pipeline);
         list.set_bind_group(0, *group);
@@ -55,9 +60,11 @@ class ControlFlow : public testing::TestWithParam<const char*> {
         std::memcpy(values.data(), bytes->data(), 256);
         return values;
     }
-    void expect(const std::string& declarations, const std::string& body, const std::function<std::uint32_t(int)>& expected) {
+    void expect(const std::string& declarations, const std::string& body,
+                const std::function<std::uint32_t(int)>& expected) {
         const std::vector<std::uint32_t> values = evaluate(declarations, body);
-        for (int id = 0; id < 64; ++id) ASSERT_EQ(values[static_cast<std::size_t>(id)], expected(id)) << "invocation " << id;
+        for (int id = 0; id < 64; ++id)
+            ASSERT_EQ(values[static_cast<std::size_t>(id)], expected(id)) << "invocation " << id;
     }
 };
 
@@ -156,7 +163,8 @@ TEST_P(ControlFlow, AnEarlyReturnOfAFunctionSkipsAStoreToAPrivateVariable) {
            });
 }
 
-INSTANTIATE_TEST_SUITE_P(Lanes, ControlFlow, testing::Values("cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16"),
+INSTANTIATE_TEST_SUITE_P(Lanes, ControlFlow,
+                         testing::Values("cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16"),
                          [](const auto& parameter) { return "Lanes" + std::string(parameter.param).substr(21); });
 
 }  // namespace

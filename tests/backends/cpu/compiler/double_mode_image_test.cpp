@@ -69,8 +69,8 @@ TEST(DoubleMode, TexelBuffersOfFloatsHaveTheDoublesOfTheirBuffer) {
                      to = bench.storage(words * 2 * 8);
         const std::string channels = std::to_string(one.channels);
         const std::string floats = "layout(set = 0, binding = 1) buffer Floats { float before[8]; float floats[]; };\n";
-        bench.dispatch(prelude + floats + "void main() { for (uint c = 0; c < " + channels + "; ++c)\nfloats[at * " + channels +
-                           " + c] = 1.0 / float(3 + at * " + channels + " + c); }\n",
+        bench.dispatch(prelude + floats + "void main() { for (uint c = 0; c < " + channels + "; ++c)\nfloats[at * " +
+                           channels + " + c] = 1.0 / float(3 + at * " + channels + " + c); }\n",
                        {{.binding = 1, .buffer = block}});
         bench.dispatch(prelude + result +
                            "layout(set = 0, binding = 1) uniform samplerBuffer fetched;\n"

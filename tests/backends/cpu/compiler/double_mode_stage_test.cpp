@@ -124,15 +124,16 @@ TEST(DoubleMode, WhatIsHiddenLeavesWhatWaitsAsItIs) {
         .format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::less};
     // The first is near; the others lie behind it, many more than a tile can keep.
     constexpr std::uint32_t triangles = 1000;
-    picture.draw(desc,
-                 "layout(location = 0) out float number;\n"
-                 "void main() { int triangle = gl_VertexIndex / 3, corner = gl_VertexIndex % 3;\n"
-                 "number = float(triangle + 1);\n"
-                 "gl_Position = vec4(corner == 1 ? 0.0 : -0.6, corner == 2 ? 0.0 : -0.6, triangle == 0 ? 0.1 : 0.5, 1.0); }\n",
-                 "layout(location = 0) in float number;\n"
-                 "layout(location = 0) out vec4 color;\n"
-                 "void main() { color = vec4(number); }\n",
-                 1, {}, 3 * triangles);
+    picture.draw(
+        desc,
+        "layout(location = 0) out float number;\n"
+        "void main() { int triangle = gl_VertexIndex / 3, corner = gl_VertexIndex % 3;\n"
+        "number = float(triangle + 1);\n"
+        "gl_Position = vec4(corner == 1 ? 0.0 : -0.6, corner == 2 ? 0.0 : -0.6, triangle == 0 ? 0.1 : 0.5, 1.0); }\n",
+        "layout(location = 0) in float number;\n"
+        "layout(location = 0) out vec4 color;\n"
+        "void main() { color = vec4(number); }\n",
+        1, {}, 3 * triangles);
     const std::vector<double> found = picture.texels(), depths = picture.texels(true);
     std::uint32_t covered = 0;
     for (std::size_t at = 0; at < found.size(); at += 4) {

@@ -25,8 +25,9 @@ Word as_bits(float value) { return std::bit_cast<Word>(value); }
 std::int32_t as_int(Word bits) { return std::bit_cast<std::int32_t>(bits); }
 bool is_nan(Word bits) { return std::isnan(as_float(bits)); }
 
-const std::vector<Word> edges{0u, 1u, 2u, 31u, 32u, 33u, 0x7fffffffu, 0x80000000u, 0xffffffffu, 0x7f800000u, 0xff800000u,
-                              0x3f800000u, 0xbfc00000u, 0x4f000000u, 0x7f7fffffu, 0x4f800000u};
+const std::vector<Word> edges{0u,          1u,          2u,          31u,         32u,         33u,
+                              0x7fffffffu, 0x80000000u, 0xffffffffu, 0x7f800000u, 0xff800000u, 0x3f800000u,
+                              0xbfc00000u, 0x4f000000u, 0x7f7fffffu, 0x4f800000u};
 
 struct Operation {
     const char* glsl;                ///< Of uint x, y; int a, b; float f, g with the same bits; a uint.
@@ -55,7 +56,10 @@ const Operation operations[] = {
     {"x * y", [](Word x, Word y) { return x * y; }},
     {"x / y", [](Word x, Word y) { return y ? x / y : ~0u; }},
     {"x % y", [](Word x, Word y) { return y ? x % y : ~0u; }},
-    {"uint(a / b)", [](Word x, Word y) { return y == 0 ? 0u : y == ~0u ? 0u - x : static_cast<Word>(as_int(x) / as_int(y)); }},
+    {"uint(a / b)",
+     [](Word x, Word y) { return y == 0     ? 0u
+                                 : y == ~0u ? 0u - x
+                                            : static_cast<Word>(as_int(x) / as_int(y)); }},
     {"uint(-a)", [](Word x, Word) { return 0u - x; }},
     {"uint(abs(a))", [](Word x, Word) { return as_int(x) < 0 ? 0u - x : x; }},
     {"x << y", [](Word x, Word y) { return x << (y & 31); }},
@@ -93,14 +97,18 @@ const Operation operations[] = {
     {"floatBitsToUint(roundEven(f))", [](Word x, Word) { return as_bits(std::nearbyint(as_float(x))); }, true},
     {"floatBitsToUint(sqrt(f))", [](Word x, Word) { return as_bits(std::sqrt(as_float(x))); }, true},
     {"floatBitsToUint(sign(f))",
-     [](Word x, Word) { return is_nan(x) ? 0u : as_bits(as_float(x) > 0 ? 1.0f : as_float(x) < 0 ? -1.0f : 0.0f); }, true},
+     [](Word x, Word) {
+         return is_nan(x) ? 0u : as_bits(as_float(x) > 0 ? 1.0f : as_float(x) < 0 ? -1.0f : 0.0f);
+     },
+     true},
 };
 
 class CpuEdges : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Cpu, CpuEdges,
                          testing::Values("cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16"),
                          [](const auto& parameter) {
-                             return "lanes_" + std::string(parameter.param).substr(std::strlen("cpu:consistent:lanes="));
+                             return "lanes_" +
+                                    std::string(parameter.param).substr(std::strlen("cpu:consistent:lanes="));
                          });
 
 TEST_P(CpuEdges, OperationsGiveWhatTheyPromise) {
@@ -127,8 +135,10 @@ TEST_P(CpuEdges, OperationsGiveWhatTheyPromise) {
     const auto input = (*device)->create_buffer({.size = edges.size() * 4, .usage = rhi::BufferUsage::storage});
     ASSERT_TRUE((*device)->write_buffer(*input, std::span<const Word>(edges)));
     const auto layout = (*device)->bind_group_layout(*pipeline, 0);
-    const auto group = (*device)->create_bind_group(
-        {.layout = *layout, .entries = {{.binding = 0, .buffer = *result}, {.binding = 1, .buffer = *input}}, .name = "edges"});
+    const auto group =
+        (*device)->create_bind_group({.layout = *layout,
+                                      .entries = {{.binding = 0, .buffer = *result}, {.binding = 1, .buffer = *input}},
+                                      .name = "edges"});
     rhi::CommandList list = (*device)->create_command_list("edges");
     list.set_pipeline(*pipeline);
     list.set_bind_group(0, *group);
@@ -139,11 +149,14 @@ TEST_P(CpuEdges, OperationsGiveWhatTheyPromise) {
     std::memcpy(found.data(), bytes->data(), bytes->size());
     for (std::size_t i = 0; i < count; ++i)
         for (std::size_t at = 0; at < pairs; ++at) {
-            const Word x = edges[at / 16], y = edges[at % 16], expected = operations[i].expected(x, y), value = found[i * pairs + at];
+            const Word x = edges[at / 16], y = edges[at % 16], expected = operations[i].expected(x, y),
+                       value = found[i * pairs + at];
             // min and max of two zeros may be either.
-            const bool is_equal = value == expected || (operations[i].is_float && ((is_nan(value) && is_nan(expected)) ||
-                                                                                  as_float(value) == as_float(expected)));
-            EXPECT_TRUE(is_equal) << operations[i].glsl << " of " << std::hex << x << ", " << y << ": " << value << ", not " << expected;
+            const bool is_equal =
+                value == expected || (operations[i].is_float &&
+                                      ((is_nan(value) && is_nan(expected)) || as_float(value) == as_float(expected)));
+            EXPECT_TRUE(is_equal) << operations[i].glsl << " of " << std::hex << x << ", " << y << ": " << value
+                                  << ", not " << expected;
         }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// texelFetch of textures of one word or two integers, which compiled code reads without a call, and of others, for which it makes one:
-// inside of the texture the texel, everywhere else zero.
+// texelFetch of textures of one word or two integers, which compiled code reads without a call, and of others, for
+// which it makes one: inside of the texture the texel, everywhere else zero.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -51,8 +51,14 @@ std::array<std::uint32_t, 4> expected_texel(const Content& content, std::int32_t
 }
 
 Expected<rhi::Texture> make_texture(rhi::Device& device, const Content& content) {
-    NACRE_TRY(const rhi::Texture texture, device.create_texture({.format = content.format, .width = width, .height = height, .layers = layers, .mips = mips,
-                                   .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::copy_destination, .name = "texels"}));
+    NACRE_TRY(const rhi::Texture texture,
+              device.create_texture({.format = content.format,
+                                     .width = width,
+                                     .height = height,
+                                     .layers = layers,
+                                     .mips = mips,
+                                     .usage = rhi::TextureUsage::sampled | rhi::TextureUsage::copy_destination,
+                                     .name = "texels"}));
     for (std::int32_t mip = 0; mip < mips; ++mip)
         for (std::int32_t layer = 0; layer < layers; ++layer) {
             std::vector<std::uint32_t> texels;
@@ -77,13 +83,16 @@ TEST_P(Fetch, GivesTexelsInsideAndZeroOutside) {
     const auto& [spec, content, is_divergent] = GetParam();
     const std::string text = std::string(R"(
         layout(local_size_x = 64) in;
-        layout(set = 0, binding = 0) uniform )") + (content.is_integer ? "usampler2DArray" : "sampler2DArray") + R"( source;
+        layout(set = 0, binding = 0) uniform )") +
+                             (content.is_integer ? "usampler2DArray" : "sampler2DArray") + R"( source;
         layout(set = 0, binding = 1, std430) writeonly buffer Result { uvec4 result[]; };
         layout(push_constant) uniform Parameters { int level; };
         void main() {
             int point = int(gl_GlobalInvocationID.x);
-            if (point >= )" + std::to_string(points) + R"() return;
-            int x = point % )" + std::to_string(columns) + " - 2, y = point / " + std::to_string(columns) + " % " +
+            if (point >= )" + std::to_string(points) +
+                             R"() return;
+            int x = point % )" +
+                             std::to_string(columns) + " - 2, y = point / " + std::to_string(columns) + " % " +
                              std::to_string(rows) + " - 2, layer = point / " + std::to_string(columns * rows) + R"( - 2;
             result[point] = uvec4(texelFetch(source, ivec3(x, y, layer), )" +
                              // The same level in all lanes, or one that only looks as if lanes could differ.
@@ -99,7 +108,8 @@ TEST_P(Fetch, GivesTexelsInsideAndZeroOutside) {
     ASSERT_TRUE(pipeline) << pipeline.error().message();
     const auto texture = make_texture(**device, content);
     ASSERT_TRUE(texture) << texture.error().message();
-    const auto sampler = (*device)->create_sampler({.magnify = rhi::Filter::nearest, .minify = rhi::Filter::nearest, .mip = rhi::Filter::nearest});
+    const auto sampler = (*device)->create_sampler(
+        {.magnify = rhi::Filter::nearest, .minify = rhi::Filter::nearest, .mip = rhi::Filter::nearest});
     const auto result = (*device)->create_buffer({.size = points * 16, .usage = rhi::BufferUsage::storage});
     const auto layout = (*device)->bind_group_layout(*pipeline, 0);
     rhi::TextureView view(*texture);
@@ -119,7 +129,8 @@ TEST_P(Fetch, GivesTexelsInsideAndZeroOutside) {
         const auto bytes = (*device)->read_buffer(*result);
         ASSERT_TRUE(bytes) << bytes.error().message();
         for (std::int32_t point = 0; point < points; ++point) {
-            const std::int32_t x = point % columns - 2, y = point / columns % rows - 2, layer = point / (columns * rows) - 2;
+            const std::int32_t x = point % columns - 2, y = point / columns % rows - 2,
+                               layer = point / (columns * rows) - 2;
             const auto expected = expected_texel(content, x, y, layer, level);
             std::uint32_t found[4];
             std::memcpy(found, bytes->data() + point * 16, 16);

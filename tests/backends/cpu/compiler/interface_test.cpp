@@ -19,7 +19,8 @@ namespace {
 constexpr std::uint32_t side = 4;
 
 /// Draws one triangle over a target of 4x4 pixels; the words of its pixels.
-Expected<std::vector<std::uint32_t>> draw(const char* spec, const rhi::ShaderDesc& vertex_words, const std::string& fragment_text) {
+Expected<std::vector<std::uint32_t>> draw(const char* spec, const rhi::ShaderDesc& vertex_words,
+                                          const std::string& fragment_text) {
     rhi::Instance instance(all_backends());
     NACRE_TRY(auto device, instance.create_device({.backend = spec}));
     rhi::ShaderCompiler compiler({});
@@ -27,12 +28,16 @@ Expected<std::vector<std::uint32_t>> draw(const char* spec, const rhi::ShaderDes
     NACRE_TRY(const auto vertex, device->create_shader(vertex_words));
     NACRE_TRY(const auto fragment, device->create_shader(fragment_words));
     NACRE_TRY(const auto target,
-              device->create_texture({.format = rhi::Format::rgba32_uint, .width = side, .height = side,
-                                      .usage = rhi::TextureUsage::color_target | rhi::TextureUsage::copy_source, .name = "target"}));
-    NACRE_TRY(const auto pipeline, device->create_graphics_pipeline({.vertex = vertex,
-                                                                     .fragment = fragment,
-                                                                     .color_targets = {{.format = rhi::Format::rgba32_uint}},
-                                                                     .name = "interface"}));
+              device->create_texture({.format = rhi::Format::rgba32_uint,
+                                      .width = side,
+                                      .height = side,
+                                      .usage = rhi::TextureUsage::color_target | rhi::TextureUsage::copy_source,
+                                      .name = "target"}));
+    NACRE_TRY(const auto pipeline,
+              device->create_graphics_pipeline({.vertex = vertex,
+                                                .fragment = fragment,
+                                                .color_targets = {{.format = rhi::Format::rgba32_uint}},
+                                                .name = "interface"}));
     rhi::CommandList list = device->create_command_list("interface");
     list.begin_render_pass({.color = {{.view = target, .load = rhi::LoadOperation::clear}}});
     list.set_pipeline(pipeline);
@@ -45,13 +50,16 @@ Expected<std::vector<std::uint32_t>> draw(const char* spec, const rhi::ShaderDes
     return words;
 }
 
-Expected<std::vector<std::uint32_t>> draw(const char* spec, const std::string& vertex_text, const std::string& fragment_text) {
+Expected<std::vector<std::uint32_t>> draw(const char* spec, const std::string& vertex_text,
+                                          const std::string& fragment_text) {
     rhi::ShaderCompiler compiler({});
     NACRE_TRY(const auto vertex_words, compiler.compile({.path = "interface.vert", .text = vertex_text}));
     return draw(spec, vertex_words, fragment_text);
 }
 
-const std::string corner = "vec4 corner() { return vec4(float(gl_VertexIndex & 1) * 4.0 - 1.0, float(gl_VertexIndex >> 1) * 4.0 - 1.0, 0.0, 1.0); }\n";
+const std::string corner =
+    "vec4 corner() { return vec4(float(gl_VertexIndex & 1) * 4.0 - 1.0, float(gl_VertexIndex >> 1) * 4.0 - 1.0, 0.0, "
+    "1.0); }\n";
 
 class Interface : public testing::TestWithParam<const char*> {};
 
@@ -90,8 +98,7 @@ TEST_P(Interface, HandsOnDoubles) {
 }
 
 TEST_P(Interface, ShowsDistancesToTheFragmentStage) {
-    const auto words = draw(GetParam(),
-                            corner + R"(
+    const auto words = draw(GetParam(), corner + R"(
         out float gl_ClipDistance[2];
         void main() {
             gl_Position = corner();
@@ -115,8 +122,7 @@ TEST_P(Interface, ShowsDistancesToTheFragmentStage) {
 }
 
 TEST_P(Interface, InterpolatesAtPlacesInPixels) {
-    const auto words = draw(GetParam(),
-                            corner + R"(
+    const auto words = draw(GetParam(), corner + R"(
         layout(location = 0) out vec2 place;
         void main() {
             gl_Position = corner();
@@ -219,12 +225,14 @@ TEST(InterfaceOfForeignModules, NumbersThatLookLikeAnOutputDoNotWriteIt) {
     spvtools::SpirvTools assembler(SPV_ENV_VULKAN_1_1);
     ASSERT_TRUE(assembler.Assemble(text, &vertex.spirv, SPV_TEXT_TO_BINARY_OPTION_PRESERVE_NUMERIC_IDS));
     // Where the distances were taken for written, what is undefined in them would cull the triangle.
-    const auto words = draw("cpu:consistent:hostile", vertex, "layout(location = 0) out uvec4 color; void main() { color = uvec4(5u); }");
+    const auto words = draw("cpu:consistent:hostile", vertex,
+                            "layout(location = 0) out uvec4 color; void main() { color = uvec4(5u); }");
     ASSERT_TRUE(words) << words.error().message();
     for (const std::uint32_t word : *words) EXPECT_EQ(word, 5u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Lanes, Interface, testing::Values("cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16"),
+INSTANTIATE_TEST_SUITE_P(Lanes, Interface,
+                         testing::Values("cpu:consistent:lanes=4", "cpu:consistent:lanes=8", "cpu:consistent:lanes=16"),
                          [](const auto& parameter) { return "Lanes" + std::string(parameter.param).substr(21); });
 
 }  // namespace

@@ -20,8 +20,8 @@ constexpr const char* lane_specs[] = {"cpu:consistent:lanes=4", "cpu:consistent:
 
 class ForeignModule : public testing::TestWithParam<const char*> {
   public:
-    void expect(const Expected<std::vector<std::uint32_t>>& words, const std::function<std::uint32_t(std::uint32_t)>& expected,
-                std::uint32_t count = 64) {
+    void expect(const Expected<std::vector<std::uint32_t>>& words,
+                const std::function<std::uint32_t(std::uint32_t)>& expected, std::uint32_t count = 64) {
         ASSERT_TRUE(words) << words.error().message();
         for (std::uint32_t i = 0; i < count; ++i) ASSERT_EQ((*words)[i], expected(i)) << "word " << i;
     }
@@ -75,10 +75,13 @@ std::string assembly_head(const std::string& capabilities, const std::string& de
 // ---- Size
 
 TEST_P(ForeignModule, CallsThatDoubleAtEachOfTwelveLevels) {
-    std::string text = glsl_head + "uint f0(uint x) { uint a = x; for (uint i = 0u; i < x % 3u; ++i) a = a * 3u + i; return a; }\n";
+    std::string text =
+        glsl_head + "uint f0(uint x) { uint a = x; for (uint i = 0u; i < x % 3u; ++i) a = a * 3u + i; return a; }\n";
     for (int i = 1; i <= 12; ++i)
-        text += fmt::format("uint f{0}(uint x) {{ uint a = f{1}(x + {0}u); if ((a & {0}u) == 0u) a += f{1}(a * 5u); else a ^= f{1}(a); "
-                            "return a; }}\n", i, i - 1);
+        text += fmt::format(
+            "uint f{0}(uint x) {{ uint a = f{1}(x + {0}u); if ((a & {0}u) == 0u) a += f{1}(a * 5u); else a ^= f{1}(a); "
+            "return a; }}\n",
+            i, i - 1);
     text += "void main() { int id = n[gl_LocalInvocationIndex]; result[id] = f12(uint(id)); }";
     const std::function<std::uint32_t(std::uint32_t, std::uint32_t)> f = [&](std::uint32_t level, std::uint32_t x) {
         if (level == 0) {
@@ -145,8 +148,10 @@ TEST_P(ForeignModule, AFunctionWithSideEffectsCalledFiveHundredTimes) {
 TEST_P(ForeignModule, SelectionsNestedAHundredDeep) {
     constexpr std::uint32_t depth = 120;
     std::string text = glsl_head + "void main() { int id = n[gl_LocalInvocationIndex]; uint a = 0u;\n";
-    for (std::uint32_t i = 0; i < depth; ++i) text += fmt::format("if (((id * {}) & {}) == 0) {{ a += {}u;\n", i * 7 + 3, 1 << (i % 5), i);
-    for (std::uint32_t i = depth; i-- > 0;) text += fmt::format("a ^= {}u; }} else {{ a = a * 3u + {}u; }}\n", i * 3, i);
+    for (std::uint32_t i = 0; i < depth; ++i)
+        text += fmt::format("if (((id * {}) & {}) == 0) {{ a += {}u;\n", i * 7 + 3, 1 << (i % 5), i);
+    for (std::uint32_t i = depth; i-- > 0;)
+        text += fmt::format("a ^= {}u; }} else {{ a = a * 3u + {}u; }}\n", i * 3, i);
     text += "result[id] = a; }";
     expect(ComputeRunner{GetParam()}.run_glsl(text), [](std::uint32_t id) {
         std::uint32_t a = 0;
@@ -162,7 +167,8 @@ TEST_P(ForeignModule, SelectionsNestedAHundredDeep) {
 
 TEST_P(ForeignModule, ASwitchOfTwoThousandCasesThatFallThrough) {
     constexpr int cases = 2000;
-    std::string text = glsl_head + "void main() { int id = n[gl_LocalInvocationIndex]; uint a = 0u; switch (id * 31) {\n";
+    std::string text =
+        glsl_head + "void main() { int id = n[gl_LocalInvocationIndex]; uint a = 0u; switch (id * 31) {\n";
     for (int i = 0; i < cases; ++i) text += fmt::format("case {}: a += {}u; {}\n", i, i * 5 + 1, i % 3 ? "break;" : "");
     text += "default: a = 7u; } result[id] = a; }";
     expect(ComputeRunner{GetParam()}.run_glsl(text), [](std::uint32_t id) {
@@ -180,7 +186,8 @@ TEST_P(ForeignModule, AConstantArrayOfTenThousandElements) {
     std::string values;
     for (std::uint32_t i = 0; i < elements; ++i) values += fmt::format("{}{}.0", i ? ", " : "", i * 7 % 1000);
     const std::string text = glsl_head + fmt::format("const float t[{0}] = float[{0}]({1});\n", elements, values) +
-                             "void main() { int id = n[gl_LocalInvocationIndex]; result[id] = uint(t[id * 97] + t[n[3]] + t[5] + t[id * 1000]); }";
+                             "void main() { int id = n[gl_LocalInvocationIndex]; result[id] = uint(t[id * 97] + "
+                             "t[n[3]] + t[5] + t[id * 1000]); }";
     expect(ComputeRunner{GetParam()}.run_glsl(text), [](std::uint32_t id) {
         const auto t = [](std::uint32_t i) { return i < elements ? i * 7 % 1000 : 0; };
         return t(id * 97) + t(3) + t(5) + t(id * 1000);
@@ -475,11 +482,13 @@ TEST_P(ForeignModule, DotProductsOfIntegers) {
         OpReturn
         OpFunctionEnd
     )", false);
-    // Bytes 3 * id mod 256 (id up to 63: up to 189, so some are negative as signed ones) four times; weights 1, -2, 3, -128.
+    // Bytes 3 * id mod 256 (id up to 63: up to 189, so some are negative as signed ones) four times; weights 1, -2, 3,
+    // -128.
     std::string whole = text;
     const std::string constants = "%four_ways = OpConstant %uint 50529027\n%weights = OpConstant %uint 2147745281\n";
     whole.insert(whole.find("%main_type ="), constants);
-    whole.erase(whole.find("        %factor = OpConstantNull %uint\n"), std::string("        %factor = OpConstantNull %uint\n").size());
+    whole.erase(whole.find("        %factor = OpConstantNull %uint\n"),
+                std::string("        %factor = OpConstantNull %uint\n").size());
     constexpr std::uint32_t weights = 0x8003fe01;
     static_assert(weights == 2147745281u && 50529027 == 0x03030303);
     const auto byte = [](std::uint32_t word, int i) { return static_cast<std::int32_t>(word >> (8 * i) & 0xff); };
@@ -531,7 +540,8 @@ TEST_P(ForeignModule, SaturatingDotProductsStopAtTheEnds) {
     static_assert(50529027 == 0x03030303 && 2155905152 == 0x80808080);
     expect(ComputeRunner{GetParam(), 128}.run_assembly(text, 0x10300), [](std::uint32_t at) {
         const std::int64_t byte = at / 2 * 3;
-        if (at % 2 == 0) return static_cast<std::uint32_t>(std::min<std::int64_t>(4294960000 + 4 * 255 * byte, 0xffffffff));
+        if (at % 2 == 0)
+            return static_cast<std::uint32_t>(std::min<std::int64_t>(4294960000 + 4 * 255 * byte, 0xffffffff));
         return static_cast<std::uint32_t>(std::max<std::int64_t>(-2147480000 - 4 * 128 * byte, -2147483648));
     }, 128);
 }
@@ -727,7 +737,8 @@ TEST(Subgroups, RotateWithAndWithoutClusters) {
         const auto words = ComputeRunner{spec}.run_assembly(text, 0x10300);
         ASSERT_TRUE(words) << words.error().message();
         for (std::uint32_t id = 0; id < 64; ++id)
-            ASSERT_EQ((*words)[id], id / 16 * 16 + (id + 3) % 16 + 1000 * (id / 4 * 4 + (id + 1) % 4)) << spec << " invocation " << id;
+            ASSERT_EQ((*words)[id], id / 16 * 16 + (id + 3) % 16 + 1000 * (id / 4 * 4 + (id + 1) % 4))
+                << spec << " invocation " << id;
     }
 }
 
@@ -774,7 +785,8 @@ TEST(ForeignModuleRefusal, NamesTheCapabilityOnDevicesWithoutIt) {
             continue;
         }
         EXPECT_EQ(words.error().code, ErrorCode::unsupported) << words.error().message();
-        EXPECT_NE(words.error().message().find("VariablePointersStorageBuffer"), std::string::npos) << words.error().message();
+        EXPECT_NE(words.error().message().find("VariablePointersStorageBuffer"), std::string::npos)
+            << words.error().message();
     }
     if (!absent.empty()) GTEST_SKIP() << absent;
 }

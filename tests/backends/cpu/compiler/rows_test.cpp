@@ -68,7 +68,8 @@ const std::vector<Index> indices{
     // Both are 5 elements from the begin if bytes are counted in 32 bits.
     {"same_or_outside", "numbers[i] < 40u ? 5u : 0x20000005u",
      [](std::uint32_t i) { return i < 40 ? 5u : 0x20000005u; }},
-    // Evenly rising modulo 2^32 only: 0x40000001 to its fourth power is 1, what is added on the way comes to 0x80000003.
+    // Evenly rising modulo 2^32 only: 0x40000001 to its fourth power is 1, what is added on the way comes to
+    // 0x80000003.
     {"neighbors_by_products",
      "(((i * 0x40000001u + 1u) * 0x40000001u + 1u) * 0x40000001u + 1u) * 0x40000001u - 0x80000003u",
      [](std::uint32_t i) { return i; }},

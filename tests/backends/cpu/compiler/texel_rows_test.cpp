@@ -91,7 +91,8 @@ std::vector<std::byte> source_texels(const Layout& layout) {
     for (std::int32_t i = 0; i < width * height; ++i)
         for (int c = 0; c < channels; ++c) {
             const double value = source_value(layout, i % width, i / width, c);
-            std::byte* const to = texels.data() + static_cast<std::size_t>(i) * layout.bytes + static_cast<std::size_t>(c) * size;
+            std::byte* const to =
+                texels.data() + static_cast<std::size_t>(i) * layout.bytes + static_cast<std::size_t>(c) * size;
             const auto number = static_cast<float>(value);
             const auto integer = static_cast<std::int32_t>(layout.is_integer ? value : 0);
             if (layout.is_integer) {
@@ -129,10 +130,14 @@ TEST_P(TexelRows, AreFetchedAndStored) {
     rhi::Instance instance(all_backends());
     auto device = instance.create_device({.backend = spec});
     ASSERT_TRUE(device) << device.error().message();
-    const auto make_texture = [&](const Layout& layout, rhi::TextureUsage usage, const std::vector<std::byte>& content) {
+    const auto make_texture = [&](const Layout& layout, rhi::TextureUsage usage,
+                                  const std::vector<std::byte>& content) {
         const auto made = (*device)->create_texture(
-            {.format = layout.format, .width = width, .height = height,
-             .usage = usage | rhi::TextureUsage::copy_destination | rhi::TextureUsage::copy_source, .name = layout.name});
+            {.format = layout.format,
+             .width = width,
+             .height = height,
+             .usage = usage | rhi::TextureUsage::copy_destination | rhi::TextureUsage::copy_source,
+             .name = layout.name});
         EXPECT_TRUE(made && (*device)->write_texture(*made, content));
         return *made;
     };
@@ -152,14 +157,18 @@ TEST_P(TexelRows, AreFetchedAndStored) {
          [](std::int32_t x, std::int32_t y) { return (x * 3 + y) % 5 != 0; }}};
     for (const Condition& condition : conditions) {
         const std::string kind = from.is_integer ? "u" : "";
-        const std::string text =
-            "layout(local_size_x = " + std::to_string(size.x) + ", local_size_y = " + std::to_string(size.y) + R"() in;
-            layout(set = 0, binding = 0) uniform )" + kind + R"(sampler2D source;
-            layout(set = 0, binding = 1, )" + to.qualifier + ") uniform writeonly " + kind + R"(image2D to;
+        const std::string text = "layout(local_size_x = " + std::to_string(size.x) +
+                                 ", local_size_y = " + std::to_string(size.y) + R"() in;
+            layout(set = 0, binding = 0) uniform )" +
+                                 kind + R"(sampler2D source;
+            layout(set = 0, binding = 1, )" +
+                                 to.qualifier + ") uniform writeonly " + kind + R"(image2D to;
             void main() {
                 ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + ivec2(-3, -2);
-                )" + condition.glsl + "\n" + kind + R"(vec4 texel = texelFetch(source, pixel, 0);
-                imageStore(to, pixel + ivec2(1, 0), )" + (to.bytes == 4 && to.format != bytes.format ? "texel" : "texel.wxzy") + R"();
+                )" + condition.glsl +
+                                 "\n" + kind + R"(vec4 texel = texelFetch(source, pixel, 0);
+                imageStore(to, pixel + ivec2(1, 0), )" +
+                                 (to.bytes == 4 && to.format != bytes.format ? "texel" : "texel.wxzy") + R"();
             })";
         rhi::ShaderCompiler compiler({});
         auto words = compiler.compile({.path = "rows.comp", .text = text});
@@ -169,15 +178,17 @@ TEST_P(TexelRows, AreFetchedAndStored) {
         ASSERT_TRUE(pipeline) << pipeline.error().message();
         const rhi::Texture destination = make_texture(to, rhi::TextureUsage::storage, before);
         const auto layout = (*device)->bind_group_layout(*pipeline, 0);
-        const auto group = (*device)->create_bind_group(
-            {.layout = *layout,
-             .entries = {{.binding = 0, .texture = source, .sampler = *sampler}, {.binding = 1, .texture = destination}},
-             .name = "rows"});
+        const auto group =
+            (*device)->create_bind_group({.layout = *layout,
+                                          .entries = {{.binding = 0, .texture = source, .sampler = *sampler},
+                                                      {.binding = 1, .texture = destination}},
+                                          .name = "rows"});
         ASSERT_TRUE(group) << group.error().message();
         rhi::CommandList list = (*device)->create_command_list("rows");
         list.set_pipeline(*pipeline);
         list.set_bind_group(0, *group);
-        list.dispatch({.x = static_cast<std::uint32_t>(columns / size.x), .y = static_cast<std::uint32_t>(rows / size.y)});
+        list.dispatch(
+            {.x = static_cast<std::uint32_t>(columns / size.x), .y = static_cast<std::uint32_t>(rows / size.y)});
         ASSERT_TRUE((*device)->submit(std::move(list)));
         const auto found = (*device)->read_texture(destination);
         ASSERT_TRUE(found) << found.error().message();
@@ -206,8 +217,9 @@ INSTANTIATE_TEST_SUITE_P(
     Lanes, TexelRows,
     testing::Combine(testing::Values("cpu:consistent", "cpu:fast:lanes=8", "cpu:fast:lanes=4"),
                      testing::Values(Group{"square", 8, 8}, Group{"line", 16, 2}, Group{"odd", 6, 6}),
-                     testing::Values(Ways{word_float, word_float}, Ways{word_integer, word_integer}, Ways{halves, halves},
-                                     Ways{floats, halves}, Ways{floats, bytes}, Ways{halves, bytes}, Ways{bytes, halves})));
+                     testing::Values(Ways{word_float, word_float}, Ways{word_integer, word_integer},
+                                     Ways{halves, halves}, Ways{floats, halves}, Ways{floats, bytes},
+                                     Ways{halves, bytes}, Ways{bytes, halves})));
 
 }  // namespace
 }  // namespace nacre::cpu

@@ -22,7 +22,8 @@ std::optional<std::string> difference_of(const Output& first, const Output& seco
             return fmt::format("{}: {:#x} and {:#x}", Output::place_of(i, stage), first.words[i], second.words[i]);
     for (std::size_t i = 0; i < first.pairs.size(); i += 2)
         if (first.pairs[i] != second.pairs[i])
-            return fmt::format("argument {} of approximate function: {} and {}", i / 2, first.pairs[i], second.pairs[i]);
+            return fmt::format("argument {} of approximate function: {} and {}", i / 2, first.pairs[i],
+                               second.pairs[i]);
     return {};
 }
 
@@ -35,7 +36,8 @@ std::optional<std::string> imprecision_of(const Output& output) {
         const double exact = functions[number].exact(argument);
         const double tolerance = functions[number].tolerance(argument, exact) + std::abs(exact) * 0x1p-24;
         if (!(std::abs(found - exact) <= tolerance))
-            return fmt::format("{} of {:.9g} is {:.9g}, not {:.9g} +- {:.3g}", functions[number].glsl, argument, found, exact, tolerance);
+            return fmt::format("{} of {:.9g} is {:.9g}, not {:.9g} +- {:.3g}", functions[number].glsl, argument, found,
+                               exact, tolerance);
     }
     return {};
 }
@@ -49,7 +51,8 @@ Expected<Output> Comparison::run(const std::string& device, const std::string& t
     const std::size_t mark = is_optimized ? optimized_mark.size() : is_reshaped ? reshaped_mark.size() : 0;
     const std::string spec = device.substr(0, device.size() - mark);
     std::string given = text;
-    if (spec == reference && given.starts_with(loop_guard)) given.replace(0, std::string_view(loop_guard).size(), loop_guard_for_lavapipe);
+    if (spec == reference && given.starts_with(loop_guard))
+        given.replace(0, std::string_view(loop_guard).size(), loop_guard_for_lavapipe);
     NACRE_TRY(std::vector<std::uint32_t> words, compile(given, stage));
     if (mark) {
         before_run("SPIRV-Tools");
@@ -69,8 +72,8 @@ Expected<Output> Comparison::run(const std::string& device, const std::string& t
     return output;
 }
 
-std::optional<Comparison::Difference> Comparison::compare(const std::string& first, const std::string& second, const std::string& text,
-                                                          Stage stage) {
+std::optional<Comparison::Difference> Comparison::compare(const std::string& first, const std::string& second,
+                                                          const std::string& text, Stage stage) {
     const auto a = run(first, text, stage);
     if (!a) return Difference{first, second, first + ": " + a.error().message()};
     const auto b = run(second, text, stage);
@@ -81,9 +84,12 @@ std::optional<Comparison::Difference> Comparison::compare(const std::string& fir
 
 std::optional<Comparison::Difference> Comparison::check(const GeneratedShader& shader) {
     // One device of several for each shader: most time is spent on compiling.
-    static const std::vector<std::string> all{"cpu:consistent", "cpu:fast:lanes=8", "cpu:fast:lanes=4", "cpu:consistent optimized"};
+    static const std::vector<std::string> all{"cpu:consistent", "cpu:fast:lanes=8", "cpu:fast:lanes=4",
+                                              "cpu:consistent optimized"};
     const std::string device = devices.empty() ? all[shader.seed % all.size()] : devices.front();
-    const std::string other = !devices.empty() ? devices.back() : has_vulkan ? reference : all[(shader.seed + 1) % all.size()];
+    const std::string other = !devices.empty() ? devices.back()
+                              : has_vulkan     ? reference
+                                               : all[(shader.seed + 1) % all.size()];
     if (const auto found = compare(device, other, shader.text, shader.stage)) return found;
     if (const auto output = run(device, shader.text, shader.stage))
         if (const auto what = imprecision_of(*output)) return Difference{device, device, *what};
@@ -102,7 +108,8 @@ std::string Comparison::reduce(const GeneratedShader& shader, const Difference& 
         for (const std::string& one : all) text += one + "\n";
         return text;
     };
-    const bool is_error = difference.what.find(": ") != std::string::npos && difference.what.starts_with(difference.first + ": ");
+    const bool is_error =
+        difference.what.find(": ") != std::string::npos && difference.what.starts_with(difference.first + ": ");
     const auto still_differs = [&](const std::vector<std::string>& candidate) {
         const std::string text = joined(candidate);
         // Outputs that nothing writes would be undefined.
@@ -132,7 +139,8 @@ std::string Comparison::reduce(const GeneratedShader& shader, const Difference& 
             if (lines[at].ends_with(first_value_mark)) continue;
             const std::size_t end = end_of(at);
             std::vector<std::string> without = lines;
-            without.erase(without.begin() + static_cast<std::ptrdiff_t>(at), without.begin() + static_cast<std::ptrdiff_t>(end) + 1);
+            without.erase(without.begin() + static_cast<std::ptrdiff_t>(at),
+                          without.begin() + static_cast<std::ptrdiff_t>(end) + 1);
             if (still_differs(without)) {
                 lines = without, changed = true;
                 continue;

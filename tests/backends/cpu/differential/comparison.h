@@ -30,14 +30,15 @@ class Comparison {
 
     /// What one device writes; "optimized" or "reshaped" may stand behind its name.
     Expected<Output> run(const std::string& device, const std::string& text, Stage stage);
-    /// The difference between Vulkan and the CPU device that this seed takes, or between that and another where there is no
-    /// Vulkan; nothing where they agree.
+    /// The difference between Vulkan and the CPU device that this seed takes, or between that and another where there
+    /// is no Vulkan; nothing where they agree.
     std::optional<Difference> check(const GeneratedShader& shader);
     /// The shortest text that still has the same two devices differ and keeps the lines that give first values.
     std::string reduce(const GeneratedShader& shader, const Difference& difference);
 
   private:
-    std::optional<Difference> compare(const std::string& first, const std::string& second, const std::string& text, Stage stage);
+    std::optional<Difference> compare(const std::string& first, const std::string& second, const std::string& text,
+                                      Stage stage);
     std::map<std::string, std::unique_ptr<DeviceRunner>> runners_;
     std::map<std::string, Output> outputs_;  ///< Of the text that is being compared.
     std::string compared_;

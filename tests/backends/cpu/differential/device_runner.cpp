@@ -46,7 +46,9 @@ void main() { target = color; }
 )";
 
 ShaderStage kind_of(Stage stage) {
-    return stage == Stage::compute ? ShaderStage::compute : stage == Stage::fragment ? ShaderStage::fragment : ShaderStage::vertex;
+    return stage == Stage::compute    ? ShaderStage::compute
+           : stage == Stage::fragment ? ShaderStage::fragment
+                                      : ShaderStage::vertex;
 }
 
 bool may_be_fused(std::uint32_t op) {
@@ -59,7 +61,9 @@ bool may_be_fused(std::uint32_t op) {
 Expected<std::vector<std::uint32_t>> compile(const std::string& text, Stage stage, bool with_lines) {
     static ShaderCompiler plain({.debug_information = false}), debuggable({});
     ShaderCompiler& compiler = with_lines ? debuggable : plain;
-    const char* path = stage == Stage::compute ? "generated.comp" : stage == Stage::fragment ? "generated.frag" : "generated.vert";
+    const char* path = stage == Stage::compute    ? "generated.comp"
+                       : stage == Stage::fragment ? "generated.frag"
+                                                  : "generated.vert";
     NACRE_TRY(const ShaderDesc desc, compiler.compile({.path = path, .text = text}));
     const std::vector<std::uint32_t>& words = desc.spirv;
     std::vector<std::uint32_t> decorations;
@@ -92,20 +96,26 @@ std::vector<std::uint32_t> optimized(const std::vector<std::uint32_t>& words, Pa
             case 1: optimizer.RegisterPass(spvtools::CreateLoopUnswitchPass()); break;
             case 2: optimizer.RegisterPass(spvtools::CreateLoopUnrollPass(false, 2)); break;
             case 3: optimizer.RegisterPass(spvtools::CreateLoopInvariantCodeMotionPass()); break;
-            default: optimizer.RegisterPass(spvtools::CreateIfConversionPass()).RegisterPass(spvtools::CreateCodeSinkingPass()); break;
+            default:
+                optimizer.RegisterPass(spvtools::CreateIfConversionPass())
+                    .RegisterPass(spvtools::CreateCodeSinkingPass());
+                break;
         }
     }
     spvtools::OptimizerOptions options;
     options.set_run_validator(false);
     std::vector<std::uint32_t> result;
     // Now and then the passes leave a module that is no longer valid.
-    const bool is_valid = optimizer.Run(words.data(), words.size(), &result, options) && spvtools::SpirvTools(SPV_ENV_VULKAN_1_1).Validate(result);
+    const bool is_valid = optimizer.Run(words.data(), words.size(), &result, options) &&
+                          spvtools::SpirvTools(SPV_ENV_VULKAN_1_1).Validate(result);
     return is_valid ? result : words;
 }
 
 std::string Output::place_of(std::size_t word, Stage stage) {
-    if (stage != Stage::compute) return fmt::format("pixel ({}, {}) component {}", word / 4 % side, word / 4 / side, word % 4);
-    if (word < result_bytes / 4) return fmt::format("result of invocation {}, word {}", word / result_words, word % result_words);
+    if (stage != Stage::compute)
+        return fmt::format("pixel ({}, {}) component {}", word / 4 % side, word / 4 / side, word % 4);
+    if (word < result_bytes / 4)
+        return fmt::format("result of invocation {}, word {}", word / result_words, word % result_words);
     word -= result_bytes / 4;
     if (word < item_bytes / 4) return fmt::format("items, byte {}", word * 4);
     word -= item_bytes / 4;
@@ -136,7 +146,8 @@ std::vector<std::string> DeviceRunner::take_messages() {
 
 Expected<std::unique_ptr<DeviceRunner>> DeviceRunner::create(const std::string& spec) {
     auto made = std::make_unique<Objects>();
-    NACRE_TRY(made->device, made->instance.create_device({.backend = spec, .validation = false, .debug_names = false, .name = "differential"}));
+    NACRE_TRY(made->device, made->instance.create_device(
+                                {.backend = spec, .validation = false, .debug_names = false, .name = "differential"}));
     Device& device = *made->device;
     device.set_message_callback([objects = made.get()](const Message& message) {
         const std::scoped_lock lock(objects->messages_mutex);
@@ -163,29 +174,45 @@ Expected<std::unique_ptr<DeviceRunner>> DeviceRunner::create(const std::string& 
     for (std::uint32_t& word : attributes) word = static_cast<std::uint32_t>(random.next()) >> random.below(31);
 
     const auto storage = BufferUsage::storage | BufferUsage::copy_source | BufferUsage::copy_destination;
-    const auto buffer = [&](Buffer& where, std::uint64_t size, BufferUsage usage, std::span<const std::uint32_t> content) -> Expected<void> {
+    const auto buffer = [&](Buffer& where, std::uint64_t size, BufferUsage usage,
+                            std::span<const std::uint32_t> content) -> Expected<void> {
         NACRE_TRY(where, device.create_buffer({.size = size, .usage = usage, .name = "buffer"}));
         if (!content.empty()) NACRE_CHECK(device.write_buffer(where, content));
         return {};
     };
     NACRE_CHECK(buffer(made->input, input.size() * 4, storage, input));
-    NACRE_CHECK(buffer(made->numbers, numbers.size() * 4, BufferUsage::uniform | BufferUsage::copy_destination, numbers));
+    NACRE_CHECK(
+        buffer(made->numbers, numbers.size() * 4, BufferUsage::uniform | BufferUsage::copy_destination, numbers));
     NACRE_CHECK(buffer(made->reals, reals.size() * 4, BufferUsage::uniform | BufferUsage::copy_destination, reals));
     NACRE_CHECK(buffer(made->result, result_bytes, storage, {}));
     NACRE_CHECK(buffer(made->items, item_bytes, storage, {}));
     NACRE_CHECK(buffer(made->counters, 24 * 4, storage, {}));
     NACRE_CHECK(buffer(made->pairs, pair_bytes, storage, {}));
-    NACRE_CHECK(buffer(made->attributes, attributes.size() * 4, BufferUsage::vertex | BufferUsage::copy_destination, attributes));
+    NACRE_CHECK(buffer(made->attributes, attributes.size() * 4, BufferUsage::vertex | BufferUsage::copy_destination,
+                       attributes));
     const auto copied = TextureUsage::copy_source | TextureUsage::copy_destination;
-    NACRE_TRY(made->texture, device.create_texture({.format = Format::rgba32_uint, .width = side, .height = side, .usage = TextureUsage::sampled | copied}));
+    NACRE_TRY(
+        made->texture,
+        device.create_texture(
+            {.format = Format::rgba32_uint, .width = side, .height = side, .usage = TextureUsage::sampled | copied}));
     NACRE_CHECK(device.write_texture(made->texture, std::as_bytes(std::span(texels))));
-    NACRE_TRY(made->texels, device.create_texture({.format = Format::r32_uint, .width = side, .height = side, .usage = TextureUsage::storage | copied}));
-    NACRE_TRY(made->target, device.create_texture({.format = Format::rgba32_uint, .width = side, .height = side, .usage = TextureUsage::color_target | copied}));
-    NACRE_TRY(made->sampler, device.create_sampler({.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest}));
+    NACRE_TRY(
+        made->texels,
+        device.create_texture(
+            {.format = Format::r32_uint, .width = side, .height = side, .usage = TextureUsage::storage | copied}));
+    NACRE_TRY(made->target, device.create_texture({.format = Format::rgba32_uint,
+                                                   .width = side,
+                                                   .height = side,
+                                                   .usage = TextureUsage::color_target | copied}));
+    NACRE_TRY(made->sampler,
+              device.create_sampler({.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest}));
     NACRE_TRY(std::vector<std::uint32_t> vertex, compile(plain_vertex, Stage::vertex));
-    NACRE_TRY(made->vertex, device.create_shader({.spirv = std::move(vertex), .stage = ShaderStage::vertex, .name = "plain vertex"}));
+    NACRE_TRY(made->vertex,
+              device.create_shader({.spirv = std::move(vertex), .stage = ShaderStage::vertex, .name = "plain vertex"}));
     NACRE_TRY(std::vector<std::uint32_t> fragment, compile(plain_fragment, Stage::fragment));
-    NACRE_TRY(made->fragment, device.create_shader({.spirv = std::move(fragment), .stage = ShaderStage::fragment, .name = "plain fragment"}));
+    NACRE_TRY(
+        made->fragment,
+        device.create_shader({.spirv = std::move(fragment), .stage = ShaderStage::fragment, .name = "plain fragment"}));
     return std::unique_ptr<DeviceRunner>(new DeviceRunner(std::move(made)));
 }
 
@@ -218,10 +245,12 @@ Expected<Output> DeviceRunner::run(const std::vector<std::uint32_t>& words, Stag
         if (reflection.bindings.empty()) return std::nullopt;
         NACRE_TRY(const BindGroupLayout layout, device.bind_group_layout(pipeline, 0));
         NACRE_TRY(std::vector<BindGroupEntry> entries, entries_of(layout));
-        NACRE_TRY(const BindGroup group, device.create_bind_group({.layout = layout, .entries = std::move(entries), .name = "generated"}));
+        NACRE_TRY(const BindGroup group,
+                  device.create_bind_group({.layout = layout, .entries = std::move(entries), .name = "generated"}));
         return group;
     };
-    NACRE_TRY(const Shader shader, device.create_shader({.spirv = words, .stage = kind_of(stage), .name = "generated"}));
+    NACRE_TRY(const Shader shader,
+              device.create_shader({.spirv = words, .stage = kind_of(stage), .name = "generated"}));
     Output output;
     const auto append = [&](const std::vector<std::byte>& bytes) {
         const std::size_t first = output.words.size();
@@ -230,8 +259,11 @@ Expected<Output> DeviceRunner::run(const std::vector<std::uint32_t>& words, Stag
     };
     CommandList list = device.create_command_list("generated");
     if (stage == Stage::compute) {
-        NACRE_TRY(const ComputePipeline pipeline, device.create_compute_pipeline({.shader = shader, .name = "generated"}));
-        const auto empty = [&](Buffer buffer, std::size_t bytes) { return device.write_buffer(buffer, std::span<const std::byte>(std::vector<std::byte>(bytes))); };
+        NACRE_TRY(const ComputePipeline pipeline,
+                  device.create_compute_pipeline({.shader = shader, .name = "generated"}));
+        const auto empty = [&](Buffer buffer, std::size_t bytes) {
+            return device.write_buffer(buffer, std::span<const std::byte>(std::vector<std::byte>(bytes)));
+        };
         NACRE_CHECK(empty(at.result, result_bytes));
         NACRE_CHECK(empty(at.counters, 24 * 4));
         NACRE_CHECK(empty(at.pairs, pair_bytes));

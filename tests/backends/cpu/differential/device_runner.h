@@ -20,11 +20,12 @@ struct Output {
     [[nodiscard]] static std::string place_of(std::size_t word, Stage stage);
 };
 
-/// SPIR-V of a generated text, in which no multiplication and addition may be fused: without that, bits are the device's choice.
+/// SPIR-V of a generated text, in which no multiplication and addition may be fused: without that, bits are the
+/// device's choice.
 /// @param with_lines  with names and line tables
 Expected<std::vector<std::uint32_t>> compile(const std::string& text, Stage stage, bool with_lines = false);
-/// The same module as passes of SPIRV-Tools leave it: those for performance; or those that change control flow most, which leave
-/// single returns, peeled, unswitched and unrolled loops, and branches turned into selections.
+/// The same module as passes of SPIRV-Tools leave it: those for performance; or those that change control flow most,
+/// which leave single returns, peeled, unswitched and unrolled loops, and branches turned into selections.
 enum class Passes : std::uint8_t { performance, control_flow };
 std::vector<std::uint32_t> optimized(const std::vector<std::uint32_t>& words, Passes passes);
 

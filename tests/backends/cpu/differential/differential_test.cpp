@@ -8,8 +8,8 @@
 //     cpu_differential_test --seed=1234 --on="cpu:double,gl" --try=changed.glsl
 //     cpu_differential_test --on="cpu,gl" --count=1000             two devices, whatever the seed
 //
-// "optimized" and "reshaped" behind a device let it run the module that passes of SPIRV-Tools leave. Those that reshape loops
-// change what some shaders do: only two devices that both run what is left of them can be compared.
+// "optimized" and "reshaped" behind a device let it run the module that passes of SPIRV-Tools leave. Those that reshape
+// loops change what some shaders do: only two devices that both run what is left of them can be compared.
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -51,7 +51,8 @@ struct Settings {
 
 constexpr int most_seconds = 120;  ///< For one shader with its reduction.
 
-/// A process of its own that goes through seeds and says in lines what it does: a driver that crashes takes only it down.
+/// A process of its own that goes through seeds and says in lines what it does: a driver that crashes takes only it
+/// down.
 struct Worker {
     pid_t process = -1;
     int lines = -1;
@@ -79,8 +80,10 @@ void say(int to, const std::string& text) {
         if (!found) continue;
         const std::string base = fmt::format("{}/{}", settings.folder, seed);
         std::ofstream(base + ".glsl") << shader.text;
-        std::ofstream(base + ".txt") << fmt::format("seed {}\n{} and {}\n{}\n", seed, found->first, found->second, found->what);
-        say(to, fmt::format("differs {} and {}: {}", found->first, found->second, found->what.substr(0, found->what.find('\n', 120))));
+        std::ofstream(base + ".txt") << fmt::format("seed {}\n{} and {}\n{}\n", seed, found->first, found->second,
+                                                    found->what);
+        say(to, fmt::format("differs {} and {}: {}", found->first, found->second,
+                            found->what.substr(0, found->what.find('\n', 120))));
         if (settings.reduces && found->what.find("shader_compile") == std::string::npos)
             std::ofstream(base + ".reduced.glsl") << comparison.reduce(shader, *found);
     }
@@ -122,14 +125,16 @@ bool has_vulkan_device() {
 struct Tally {
     std::uint64_t shaders = 0;
     std::vector<std::string> differences;
-    std::vector<std::string> failures_of_others;  ///< Crashes and hangs of other drivers and of SPIRV-Tools' passes: no verdict.
+    std::vector<std::string>
+        failures_of_others;  ///< Crashes and hangs of other drivers and of SPIRV-Tools' passes: no verdict.
 };
 
 Tally run_all(bool has_vulkan) {
     Tally tally;
     std::vector<Worker> workers(static_cast<std::size_t>(settings.workers));
     for (std::size_t i = 0; i < workers.size(); ++i) {
-        workers[i].next = settings.seed + i, workers[i].stride = workers.size(), workers[i].end = settings.seed + settings.count;
+        workers[i].next = settings.seed + i, workers[i].stride = workers.size(),
+        workers[i].end = settings.seed + settings.count;
         launch(workers[i], has_vulkan);
     }
     const auto finish = [&](Worker& worker, const std::string& how) {
@@ -142,7 +147,8 @@ Tally run_all(bool has_vulkan) {
         std::cout << text << std::endl;
         std::ofstream(fmt::format("{}/{}.txt", settings.folder, worker.seed)) << text << "\n";
         std::ofstream(fmt::format("{}/{}.glsl", settings.folder, worker.seed)) << generate(worker.seed).text;
-        const bool has_no_verdict = worker.device.starts_with("vulkan") || worker.device.starts_with("gl") || worker.device == "SPIRV-Tools";
+        const bool has_no_verdict =
+            worker.device.starts_with("vulkan") || worker.device.starts_with("gl") || worker.device == "SPIRV-Tools";
         (has_no_verdict ? tally.failures_of_others : tally.differences).push_back(text);
         worker.next = worker.seed + worker.stride;
         if (worker.next < worker.end) launch(worker, has_vulkan);
@@ -170,7 +176,8 @@ Tally run_all(bool has_vulkan) {
             }
             worker.pending.append(bytes, static_cast<std::size_t>(got));
             bool ended = false;
-            for (std::size_t end; (end = worker.pending.find('\n')) != std::string::npos; worker.pending.erase(0, end + 1)) {
+            for (std::size_t end; (end = worker.pending.find('\n')) != std::string::npos;
+                 worker.pending.erase(0, end + 1)) {
                 const std::string text = worker.pending.substr(0, end);
                 if (text.starts_with("seed ")) {
                     worker.seed = std::strtoull(text.c_str() + 5, nullptr, 10);
@@ -190,8 +197,8 @@ Tally run_all(bool has_vulkan) {
     }
 }
 
-/// Nothing is kept on disk; the reference filters as Vulkan asks, and compiles in half the time: without LLVM's passes and for
-/// vectors of 128 bits, with which its results have the same bits.
+/// Nothing is kept on disk; the reference filters as Vulkan asks, and compiles in half the time: without LLVM's passes
+/// and for vectors of 128 bits, with which its results have the same bits.
 void set_environment() {
     setenv("NACRE_CACHE_DIR", "off", 1);
     setenv("MESA_SHADER_CACHE_DISABLE", "true", 1);
@@ -205,8 +212,8 @@ TEST(CpuDifferential, RandomShadersGiveEqualResults) {
     const bool has_vulkan = has_vulkan_device();
     if (!has_vulkan) std::cout << "no Vulkan device: lane widths are compared with each other only" << std::endl;
     const Tally tally = run_all(has_vulkan);
-    std::cout << fmt::format("{} shaders, {} differences, {} failures of others", tally.shaders, tally.differences.size(),
-                             tally.failures_of_others.size())
+    std::cout << fmt::format("{} shaders, {} differences, {} failures of others", tally.shaders,
+                             tally.differences.size(), tally.failures_of_others.size())
               << std::endl;
     EXPECT_EQ(tally.shaders, settings.count);
     for (const std::string& text : tally.differences) ADD_FAILURE() << text << "\nThe shader is in " << settings.folder;
@@ -245,11 +252,18 @@ int main(int argc, char** argv) {
             const std::string changed(std::istreambuf_iterator<char>(file), {});
             nacre::differential::Comparison comparison;
             if (settings.devices.empty())
-                settings.devices = {"cpu:consistent", "cpu:consistent optimized", "cpu:consistent reshaped", "cpu:fast:lanes=8", "cpu:fast:lanes=4", "vulkan", "gl"};
+                settings.devices = {"cpu:consistent",
+                                    "cpu:consistent optimized",
+                                    "cpu:consistent reshaped",
+                                    "cpu:fast:lanes=8",
+                                    "cpu:fast:lanes=4",
+                                    "vulkan",
+                                    "gl"};
             for (const std::string& device : settings.devices) {
                 const auto output = comparison.run(device, changed, shader.stage);
                 std::cout << device << ":";
-                for (std::size_t word = 0; output && word < 8; ++word) std::cout << fmt::format(" {:#x}", output->words[word]);
+                for (std::size_t word = 0; output && word < 8; ++word)
+                    std::cout << fmt::format(" {:#x}", output->words[word]);
                 std::cout << (output ? "" : output.error().message()) << std::endl;
             }
             return 0;

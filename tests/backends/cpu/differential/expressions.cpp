@@ -25,8 +25,9 @@ std::string Generator::literal(const GlslType& type) {
     switch (type.kind) {
         case Kind::boolean: scalar = random_.chance(50) ? "true" : "false"; break;
         case Kind::integer:
-            scalar = random_.chance(70) ? fmt::format("({})", random_.between(-9, 40))
-                                        : random_.pick({"2147483647", "(-2147483647 - 1)", "(-1)", "0", "65535", "(-65536)"});
+            scalar = random_.chance(70)
+                         ? fmt::format("({})", random_.between(-9, 40))
+                         : random_.pick({"2147483647", "(-2147483647 - 1)", "(-1)", "0", "65535", "(-65536)"});
             break;
         case Kind::natural:
             scalar = random_.chance(70) ? fmt::format("{}u", random_.between(0, 40))
@@ -75,8 +76,10 @@ std::string Generator::leaf(const GlslType& type) {
     for (const Place& place : places_) {
         if (only_uniform_ && !place.is_uniform) continue;
         if (place.type == type) fitting.push_back(&place), fitting.push_back(&place);
-        else if (place.type.kind == type.kind && type.kind != Kind::matrix && place.type.size > 1) fitting.push_back(&place);
-        else if (place.type.kind == Kind::matrix && type.kind == Kind::real && place.type.size == type.size) fitting.push_back(&place);
+        else if (place.type.kind == type.kind && type.kind != Kind::matrix && place.type.size > 1)
+            fitting.push_back(&place);
+        else if (place.type.kind == Kind::matrix && type.kind == Kind::real && place.type.size == type.size)
+            fitting.push_back(&place);
     }
     if (fitting.empty()) return literal(type);
     const Place place = *random_.pick(fitting);
@@ -117,7 +120,8 @@ std::string Generator::expression(const GlslType& type, int depth) {
     const GlslFunction* callee = nullptr;
     if (random_.chance(8))
         for (const GlslFunction& function : functions_)
-            if (&function != current_ && function.is_pure && function.has_result && function.result == type) callee = &function;
+            if (&function != current_ && function.is_pure && function.has_result && function.result == type)
+                callee = &function;
     if (callee) {
         text = call(*callee, depth - 1);
     } else if (random_.chance(10)) {
@@ -145,23 +149,28 @@ std::string Generator::boolean_expression(int size, int depth) {
     if (size > 1) {
         if (random_.chance(20)) return fmt::format("not({})", expression(type, down));
         const GlslType compared{kind, size, 1};
-        return fmt::format("{}({}, {})", random_.pick({"lessThan", "lessThanEqual", "greaterThan", "greaterThanEqual", "equal", "notEqual"}),
-                           expression(compared, down), expression(compared, down));
+        return fmt::format(
+            "{}({}, {})",
+            random_.pick({"lessThan", "lessThanEqual", "greaterThan", "greaterThanEqual", "equal", "notEqual"}),
+            expression(compared, down), expression(compared, down));
     }
     switch (random_.below(9)) {
         case 0: return fmt::format("(!{})", expression(type, down));
         case 1: return fmt::format("({} && {})", expression(type, down), expression(type, down));
         case 2: return fmt::format("({} || {})", expression(type, down), expression(type, down));
         case 3: return fmt::format("({} ^^ {})", expression(type, down), expression(type, down));
-        case 4: return fmt::format("{}({})", random_.pick({"any", "all"}), expression({Kind::boolean, random_.between(2, 4), 1}, down));
+        case 4:
+            return fmt::format("{}({})", random_.pick({"any", "all"}),
+                               expression({Kind::boolean, random_.between(2, 4), 1}, down));
         case 5: {
             const GlslType compared{kind, random_.between(2, 4), 1};
-            return fmt::format("({} {} {})", expression(compared, down), random_.pick({"==", "!="}), expression(compared, down));
+            return fmt::format("({} {} {})", expression(compared, down), random_.pick({"==", "!="}),
+                               expression(compared, down));
         }
         default: {
             const GlslType compared{kind, 1, 1};
-            return fmt::format("({} {} {})", expression(compared, down), random_.pick({"<", ">", "<=", ">=", "==", "!="}),
-                               expression(compared, down));
+            return fmt::format("({} {} {})", expression(compared, down),
+                               random_.pick({"<", ">", "<=", ">=", "==", "!="}), expression(compared, down));
         }
     }
 }
@@ -169,7 +178,8 @@ std::string Generator::boolean_expression(int size, int depth) {
 std::string Generator::integer_expression(const GlslType& type, int depth) {
     const int down = depth - 1;
     const bool is_signed = type.kind == Kind::integer;
-    const GlslType natural{Kind::natural, type.size, 1}, integer{Kind::integer, type.size, 1}, real{Kind::real, type.size, 1};
+    const GlslType natural{Kind::natural, type.size, 1}, integer{Kind::integer, type.size, 1},
+        real{Kind::real, type.size, 1};
     const auto one = [&] { return expression(type, down); };
     switch (random_.below(24)) {
         case 0: case 1: case 2: return fmt::format("({} + {})", one(), one());
@@ -178,7 +188,8 @@ std::string Generator::integer_expression(const GlslType& type, int depth) {
         case 6: return fmt::format("({} {} {})", one(), random_.pick({"&", "|", "^"}), one());
         case 7: return fmt::format("({} {} ({} & 31))", one(), random_.pick({"<<", ">>"}), expression(integer, down));
         case 8:  // The divisor is above 0.
-            return is_signed ? fmt::format("({} / (({} & 1023) + 1))", one(), one()) : fmt::format("({} / ({} | 1u))", one(), one());
+            return is_signed ? fmt::format("({} / (({} & 1023) + 1))", one(), one())
+                             : fmt::format("({} / ({} | 1u))", one(), one());
         case 9:  // Of negative numbers the remainder is undefined.
             return is_signed ? fmt::format("(({} & 0x7fffffff) % (({} & 1023) + 1))", one(), one())
                              : fmt::format("({} % ({} | 1u))", one(), one());
@@ -190,7 +201,9 @@ std::string Generator::integer_expression(const GlslType& type, int depth) {
             const char* high = is_signed ? "900" : "900u";
             return fmt::format("clamp({}, {}, {})", one(), low, high);
         }
-        case 14: return fmt::format("{}({})", type.name(), fmt::format("{}({})", random_.pick({"bitCount", "findLSB", "findMSB"}), one()));
+        case 14:
+            return fmt::format("{}({})", type.name(),
+                               fmt::format("{}({})", random_.pick({"bitCount", "findLSB", "findMSB"}), one()));
         case 15: return fmt::format("bitfieldReverse({})", one());
         case 16: {
             const std::string offset = fmt::format("({} & 15)", expression({Kind::integer, 1, 1}, 1));
@@ -200,15 +213,20 @@ std::string Generator::integer_expression(const GlslType& type, int depth) {
         }
         case 17: return fmt::format("{}({})", type.name(), expression(is_signed ? natural : integer, down));
         case 18: return fmt::format("{}({})", type.name(), expression({Kind::boolean, type.size, 1}, down));
-        case 19: return fmt::format("{}(keep({}))", type.name(), is_signed ? expression(real, down) : fmt::format("abs({})", expression(real, down)));
+        case 19:
+            return fmt::format("{}(keep({}))", type.name(),
+                               is_signed ? expression(real, down) : fmt::format("abs({})", expression(real, down)));
         case 20:
-            return fmt::format("{}({})", is_signed ? "floatBitsToInt" : "floatBitsToUint", fmt::format("keep({})", expression(real, down)));
+            return fmt::format("{}({})", is_signed ? "floatBitsToInt" : "floatBitsToUint",
+                               fmt::format("keep({})", expression(real, down)));
         case 21: return is_signed ? fmt::format("sign({})", one()) : fmt::format("({} ^ {})", one(), one());
         case 22: return fmt::format("({} ^ ({} >> {}))", one(), one(), random_.between(1, 15));
         default:
             if (type.size == 1 && !is_signed && random_.chance(50))
-                return fmt::format("texelFetch(numbers, ivec2({} & 15, {} & 15), 0).{}", expression(integer, down), expression(integer, down), swizzle(4, 1, false));
-            if (type.size > 1 && random_.chance(50)) return fmt::format("mix({}, {}, {})", one(), one(), expression({Kind::boolean, type.size, 1}, down));
+                return fmt::format("texelFetch(numbers, ivec2({} & 15, {} & 15), 0).{}", expression(integer, down),
+                                   expression(integer, down), swizzle(4, 1, false));
+            if (type.size > 1 && random_.chance(50))
+                return fmt::format("mix({}, {}, {})", one(), one(), expression({Kind::boolean, type.size, 1}, down));
             return leaf(type);
     }
 }
@@ -239,15 +257,19 @@ std::string Generator::real_expression(const GlslType& type, int depth) {
                 // Sums of small whole numbers, exact in any order.
                 const int size = random_.between(2, 4);
                 const GlslType vector{Kind::integer, size, 1};
-                return fmt::format("dot(vec{0}({1} & 63), vec{0}({2} & 63))", size, expression(vector, down), expression(vector, down));
+                return fmt::format("dot(vec{0}({1} & 63), vec{0}({2} & 63))", size, expression(vector, down),
+                                   expression(vector, down));
             }
             return fmt::format("keep({} * {})", one(), expression({Kind::real, 1, 1}, down));
         default: {
             if (type.size == 1) return fmt::format("keep({} * 0.625)", one());
             const GlslType matrix{Kind::matrix, type.size, random_.between(2, 4)};
-            if (random_.chance(50)) return fmt::format("({} * whole({}))", expression(matrix, down), expression({Kind::real, matrix.columns, 1}, down));
+            if (random_.chance(50))
+                return fmt::format("({} * whole({}))", expression(matrix, down),
+                                   expression({Kind::real, matrix.columns, 1}, down));
             const GlslType turned{Kind::matrix, random_.between(2, 4), type.size};
-            return fmt::format("(whole({}) * {})", expression({Kind::real, turned.size, 1}, down), expression(turned, down));
+            return fmt::format("(whole({}) * {})", expression({Kind::real, turned.size, 1}, down),
+                               expression(turned, down));
         }
     }
 }
@@ -271,7 +293,8 @@ std::string Generator::matrix_expression(const GlslType& type, int depth) {
             if (left.starts_with("transpose(")) left = fold(left);
             return fold(fmt::format("{} * {}", left, expression({Kind::matrix, 2, type.columns}, down)));
         }
-        case 4: return fold(fmt::format("{} * whole({})", expression(type, down), expression({Kind::real, 1, 1}, down)));
+        case 4:
+            return fold(fmt::format("{} * whole({})", expression(type, down), expression({Kind::real, 1, 1}, down)));
         default:
             return fold(fmt::format("outerProduct(whole({}), whole({}))", expression({Kind::real, type.size, 1}, down),
                                     expression({Kind::real, type.columns, 1}, down)));
@@ -297,7 +320,8 @@ std::string Generator::as_bits(const std::string& value, const GlslType& type) {
     if (type.size == 1) return scalar(value, type.kind);
     std::string text;
     for (int i = 0; i < type.size; ++i)
-        text += fmt::format("{}{} * {}u", i ? " ^ " : "", scalar(fmt::format("({}).{}", value, letters[i]), type.kind), 2 * i + 1);
+        text += fmt::format("{}{} * {}u", i ? " ^ " : "", scalar(fmt::format("({}).{}", value, letters[i]), type.kind),
+                            2 * i + 1);
     return "(" + text + ")";
 }
 

@@ -7,9 +7,9 @@
 /// @file
 /// Random shaders without undefined behavior, the same for the same seed.
 ///
-/// All of them read the same inputs (see `inputs.h`) and write the same kinds of outputs, whose bits follow from SPIR-V's
-/// definitions: integers, and floats made by operations that are rounded correctly. What has a tolerance in Vulkan goes
-/// into pairs of argument and result, which are judged by themselves.
+/// All of them read the same inputs (see `inputs.h`) and write the same kinds of outputs, whose bits follow from
+/// SPIR-V's definitions: integers, and floats made by operations that are rounded correctly. What has a tolerance in
+/// Vulkan goes into pairs of argument and result, which are judged by themselves.
 
 namespace nacre::differential {
 
@@ -35,9 +35,9 @@ inline constexpr const char* first_value_mark = "  // first value";
 
 /// First line of every text. Every loop whose body runs before its condition begins with what it defines: nothing.
 inline constexpr const char* loop_guard = "#define loop_guard";
-/// Takes the line's place for lavapipe, whose values made in such a body are wrong behind the loop in invocations that leave it
-/// before others: of what is loaded there they see zero (Mesa 22.3 keeps no copy by lane of a value that no iteration but its
-/// own needs). A way out that is never taken has it keep one.
+/// Takes the line's place for lavapipe, whose values made in such a body are wrong behind the loop in invocations that
+/// leave it before others: of what is loaded there they see zero (Mesa 22.3 keeps no copy by lane of a value that no
+/// iteration but its own needs). A way out that is never taken has it keep one.
 inline constexpr const char* loop_guard_for_lavapipe = "#define loop_guard if (words[255] == 0xabcd1234u) break;";
 
 /// A shader for the seed: three of five are compute shaders.

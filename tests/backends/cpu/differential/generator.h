@@ -20,7 +20,8 @@ struct GlslType {
     [[nodiscard]] std::string name() const;
 };
 
-/// Something that can be read, and perhaps written. '@' and '#' in the text stand for indices below count and inner_count.
+/// Something that can be read, and perhaps written. '@' and '#' in the text stand for indices below count and
+/// inner_count.
 struct Place {
     std::string text;
     GlslType type;

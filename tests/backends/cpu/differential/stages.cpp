@@ -35,12 +35,14 @@ std::string helpers() {
     text += "vec3 keep(vec3 v) { return vec3(keep(v.x), keep(v.y), keep(v.z)); }\n";
     text += "vec4 keep(vec4 v) { return vec4(keep(v.x), keep(v.y), keep(v.z), keep(v.w)); }\n";
     text += "float whole(float x) { return float(int(keep(x)) & 63); }\n";
-    for (int size = 2; size <= 4; ++size) text += fmt::format("vec{0} whole(vec{0} x) {{ return vec{0}(ivec{0}(keep(x)) & 63); }}\n", size);
+    for (int size = 2; size <= 4; ++size)
+        text += fmt::format("vec{0} whole(vec{0} x) {{ return vec{0}(ivec{0}(keep(x)) & 63); }}\n", size);
     for (int columns = 2; columns <= 4; ++columns)
         for (int rows = 2; rows <= 4; ++rows) {
             std::string parts;
             // Products and sums of such matrices are far from what no int can hold.
-            for (int i = 0; i < columns; ++i) parts += fmt::format("{}vec{}(ivec{}(x[{}]) & 63)", i ? ", " : "", rows, rows, i);
+            for (int i = 0; i < columns; ++i)
+                parts += fmt::format("{}vec{}(ivec{}(x[{}]) & 63)", i ? ", " : "", rows, rows, i);
             text += fmt::format("mat{0}x{1} fold(mat{0}x{1} x) {{ return mat{0}x{1}({2}); }}\n", columns, rows, parts);
         }
     return text;
@@ -55,7 +57,12 @@ std::vector<Place> members_of_mixed(const std::string& text, int count, bool wri
     return {
         {.text = text + ".a", .type = integer(1), .count = count, .writable = writable, .is_uniform = is_uniform},
         {.text = text + ".b", .type = real(3), .count = count, .writable = writable, .is_uniform = is_uniform},
-        {.text = text + ".c[#]", .type = natural(1), .count = count, .inner_count = 3, .writable = writable, .is_uniform = is_uniform},
+        {.text = text + ".c[#]",
+         .type = natural(1),
+         .count = count,
+         .inner_count = 3,
+         .writable = writable,
+         .is_uniform = is_uniform},
         {.text = text + ".d", .type = matrix(2, 3), .count = count, .writable = writable, .is_uniform = is_uniform},
         {.text = text + ".e", .type = real(1), .count = count, .writable = writable, .is_uniform = is_uniform},
         {.text = text + ".f", .type = integer(2), .count = count, .writable = writable, .is_uniform = is_uniform},
@@ -72,10 +79,12 @@ void Generator::declarations() {
         struct Size {
             int x, y, z;
         };
-        const Size size = random_.pick({Size{64, 1, 1}, Size{16, 1, 1}, Size{32, 2, 1}, Size{8, 4, 2}, Size{12, 1, 1}, Size{5, 3, 3},
-                                        Size{20, 2, 1}, Size{1, 1, 1}, Size{3, 11, 1}, Size{128, 1, 1}, Size{8, 1, 1}, Size{16, 4, 1}});
+        const Size size = random_.pick({Size{64, 1, 1}, Size{16, 1, 1}, Size{32, 2, 1}, Size{8, 4, 2}, Size{12, 1, 1},
+                                        Size{5, 3, 3}, Size{20, 2, 1}, Size{1, 1, 1}, Size{3, 11, 1}, Size{128, 1, 1},
+                                        Size{8, 1, 1}, Size{16, 4, 1}});
         shader_.invocations = static_cast<std::uint32_t>(size.x * size.y * size.z);
-        line(fmt::format("layout(local_size_x = {}, local_size_y = {}, local_size_z = {}) in;", size.x, size.y, size.z));
+        line(
+            fmt::format("layout(local_size_x = {}, local_size_y = {}, local_size_z = {}) in;", size.x, size.y, size.z));
         uses_barriers_ = random_.chance(50);
     } else if (shader_.stage == Stage::fragment) {
         line("layout(location = 0) out uvec4 color;");
@@ -98,7 +107,8 @@ void Generator::declarations() {
     if (shader_.stage == Stage::compute) line("ivec2 place = ivec2(0);");
 
     const auto add = [&](std::string text, GlslType type, int count, bool is_uniform) {
-        places_.push_back({.text = std::move(text), .type = type, .count = count, .writable = false, .is_uniform = is_uniform});
+        places_.push_back(
+            {.text = std::move(text), .type = type, .count = count, .writable = false, .is_uniform = is_uniform});
     };
     add("identity", natural(1), 0, false);
     add("words[(identity + @) & 255u]", natural(1), 200, false);
@@ -116,7 +126,9 @@ void Generator::declarations() {
     add("reals_block.list[@]", real(2), 3, true);
     add("reals_block.r", matrix(3, 2), 0, true);
     add("reals_block.last", real(4), 0, true);
-    const auto add_all = [&](const std::vector<Place>& members) { places_.insert(places_.end(), members.begin(), members.end()); };
+    const auto add_all = [&](const std::vector<Place>& members) {
+        places_.insert(places_.end(), members.begin(), members.end());
+    };
     add_all(members_of_mixed("reals_block.s[@]", 3, false, true));
     structures_.push_back("reals_block.s[@]");
     if (shader_.stage == Stage::compute) {
@@ -138,7 +150,8 @@ void Generator::declarations() {
         const GlslType type = random_type();
         const std::string name = fmt::format("g{}", names_++);
         if (random_.chance(30) && type.kind != Kind::matrix) {
-            line(fmt::format("{0} {1}[4] = {0}[4]({2}, {3}, {2}, {2});", type.name(), name, literal(type), literal(type)));
+            line(fmt::format("{0} {1}[4] = {0}[4]({2}, {3}, {2}, {2});", type.name(), name, literal(type),
+                             literal(type)));
             places_.push_back({.text = name + "[@]", .type = type, .count = 4, .is_uniform = random_.chance(50)});
         } else {
             line(fmt::format("{} {} = {};", type.name(), name, literal(type)));
@@ -180,7 +193,11 @@ void Generator::function(int number) {
         const int way = made.is_pure ? 0 : random_.below(3);
         parameter.way = static_cast<Parameter::Way>(way);
         const std::string name = fmt::format("p{}", names_++);
-        list += fmt::format("{}{} {} {}", i ? ", " : "", way == 0 ? "in" : way == 1 ? "out" : "inout", parameter.type.name(), name);
+        list += fmt::format("{}{} {} {}", i ? ", " : "",
+                            way == 0   ? "in"
+                            : way == 1 ? "out"
+                                       : "inout",
+                            parameter.type.name(), name);
         if (way == 1) first.push_back(fmt::format("{} = {};", name, literal(parameter.type)));
         places_.push_back({.text = name, .type = parameter.type, .is_plain = true});
         made.parameters.push_back(parameter);
@@ -220,7 +237,8 @@ void Generator::main_function() {
     open("void main()");
     if (shader_.stage == Stage::compute) {
         line("uvec3 grid = gl_WorkGroupID;");
-        line(fmt::format("identity = gl_WorkGroupID.x * {}u + gl_LocalInvocationIndex;{}", shader_.invocations, first_value_mark));
+        line(fmt::format("identity = gl_WorkGroupID.x * {}u + gl_LocalInvocationIndex;{}", shader_.invocations,
+                         first_value_mark));
         line(fmt::format("place = ivec2(identity & 15u, identity >> 4);{}", first_value_mark));
     } else if (shader_.stage == Stage::fragment) {
         line("identity = uint(gl_FragCoord.x) + 16u * uint(gl_FragCoord.y);");
@@ -231,9 +249,10 @@ void Generator::main_function() {
     }
     for (const std::string& text : initial_) line(text + first_value_mark);
     if (uses_barriers_) {
-        for (const char* text : {"own[gl_LocalInvocationIndex] = reals_block.s[identity % 3u];", "shown[gl_LocalInvocationIndex] = 99u;",
-                                 "for (int i = 0; i < 6; ++i) if (gl_LocalInvocationIndex == 0u) tallies[i] = 1000u * uint(i) + 77u;",
-                                 "barrier();"})
+        for (const char* text :
+             {"own[gl_LocalInvocationIndex] = reals_block.s[identity % 3u];", "shown[gl_LocalInvocationIndex] = 99u;",
+              "for (int i = 0; i < 6; ++i) if (gl_LocalInvocationIndex == 0u) tallies[i] = 1000u * uint(i) + 77u;",
+              "barrier();"})
             line(text + std::string(first_value_mark));
         for (Place& place : members_of_mixed("own[gl_LocalInvocationIndex]", 1, true, false)) places_.push_back(place);
         structures_.push_back("own[gl_LocalInvocationIndex]");

@@ -11,7 +11,8 @@ namespace nacre::differential {
 namespace {
 
 constexpr int deepest_nesting = 4;
-const GlslType one_bool{Kind::boolean, 1, 1}, one_uint{Kind::natural, 1, 1}, one_int{Kind::integer, 1, 1}, one_float{Kind::real, 1, 1};
+const GlslType one_bool{Kind::boolean, 1, 1}, one_uint{Kind::natural, 1, 1}, one_int{Kind::integer, 1, 1},
+    one_float{Kind::real, 1, 1};
 
 }  // namespace
 
@@ -156,8 +157,9 @@ void Generator::loop_statement() {
     // Of which one only compiler and machine know; nested loops go round less often.
     const int most = depth_ < 2 ? random_.between(2, 7) : random_.between(1, 4);
     std::string bound = fmt::format("{}", most);
-    if (random_.chance(70)) bound = has_barriers ? fmt::format("int(numbers_block.w[{}] % {}u)", random_.below(4), most + 1)
-                                                 : fmt::format("int({} % {}u)", expression(one_uint, 1), most + 1);
+    if (random_.chance(70))
+        bound = has_barriers ? fmt::format("int(numbers_block.w[{}] % {}u)", random_.below(4), most + 1)
+                             : fmt::format("int({} % {}u)", expression(one_uint, 1), most + 1);
     only_uniform_ = was_uniform;
     const std::size_t places = places_.size();
     const int loops = loops_, switches = switches_;
@@ -178,8 +180,9 @@ void Generator::loop_statement() {
     } else {
         line(fmt::format("int {} = 0;", counter));
         places_.push_back(counted);
-        const std::string again = random_.chance(50) ? fmt::format("{}++ < {}", counter, bound)
-                                                     : fmt::format("{}++ < {} && {}", counter, most, expression(one_bool, 2));
+        const std::string again = random_.chance(50)
+                                      ? fmt::format("{}++ < {}", counter, bound)
+                                      : fmt::format("{}++ < {} && {}", counter, most, expression(one_bool, 2));
         if (form == 2) open(fmt::format("while ({})", again));
         else open("do"), line("loop_guard");
         block(random_.between(1, 4));
@@ -277,7 +280,8 @@ void Generator::call_statement() {
     }
     text += ")";
     if (function.has_result) {
-        if (const Place* place = writable_place(&function.result)) return line(fmt::format("{} = {};", fill_indices(*place), text));
+        if (const Place* place = writable_place(&function.result))
+            return line(fmt::format("{} = {};", fill_indices(*place), text));
         const std::string name = fmt::format("v{}", names_++);
         line(fmt::format("{} {} = {};", function.result.name(), name, text));
         places_.push_back({.text = name, .type = function.result, .is_plain = true});
@@ -292,7 +296,8 @@ void Generator::exchange() {
     line(std::string("barrier();") + first_value_mark);
     line(fmt::format("shown[gl_LocalInvocationIndex] = {};", expression(one_uint, 2)));
     line(std::string("barrier();") + first_value_mark);
-    line(fmt::format("hash = (hash ^ shown[(gl_LocalInvocationIndex + {}u) % {}u]) * 16777619u;", random_.between(1, 20), shader_.invocations));
+    line(fmt::format("hash = (hash ^ shown[(gl_LocalInvocationIndex + {}u) % {}u]) * 16777619u;",
+                     random_.between(1, 20), shader_.invocations));
 }
 
 void Generator::atomic() {
@@ -300,8 +305,11 @@ void Generator::atomic() {
     static const char* const names[] = {"atomicAdd", "atomicMin", "atomicMax", "atomicAnd", "atomicOr", "atomicXor"};
     const int operation = random_.below(6);
     const std::string value = expression(one_uint, 2);
-    if (uses_barriers_ && random_.chance(50)) line(fmt::format("{}(tallies[{}], {});", names[operation], operation, value));
-    else line(fmt::format("{}(counters[{} + {}], {});", names[operation], operation * 4, fmt::format("int({})", index(4)), value));
+    if (uses_barriers_ && random_.chance(50))
+        line(fmt::format("{}(tallies[{}], {});", names[operation], operation, value));
+    else
+        line(fmt::format("{}(counters[{} + {}], {});", names[operation], operation * 4,
+                         fmt::format("int({})", index(4)), value));
 }
 
 void Generator::image() {
@@ -316,7 +324,8 @@ void Generator::approximate() {
     const int number = random_.below(static_cast<int>(functions.size()));
     const ApproximateFunction& function = functions[static_cast<std::size_t>(number)];
     const std::string name = fmt::format("x{}", names_++);
-    line(fmt::format("float {} = clamp(keep({}), {:.6f}, {:.6f});", name, expression(one_float, 2), function.low, function.high));
+    line(fmt::format("float {} = clamp(keep({}), {:.6f}, {:.6f});", name, expression(one_float, 2), function.low,
+                     function.high));
     std::string text;
     for (const char letter : std::string(function.glsl)) text += letter == '$' ? name : std::string(1, letter);
     line(fmt::format("pairs[identity * {}u + {}u] = vec2({}, {});", approximate_pairs, number, name, text));

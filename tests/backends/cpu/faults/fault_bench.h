@@ -16,8 +16,8 @@ namespace nacre::cpu {
 ///
 /// Set 0 of compute shaders: binding 0 buffer 'output' (256 words, nothing has written them), 1 buffer 'input' (64
 /// words, 0 to 63), 2 image 'picture' (8x8 words, nothing has written them), 3 texture 'numbers' (8x8 words, 0 to 63),
-/// 4 sampler 'nearest', 5 texture 'target', 6 texel buffer of the words of 'output', 7 texel buffer of those of 'input'.
-/// Shaders declare what they use.
+/// 4 sampler 'nearest', 5 texture 'target', 6 texel buffer of the words of 'output', 7 texel buffer of those of
+/// 'input'. Shaders declare what they use.
 class FaultBench {
   public:
     explicit FaultBench(const std::string& backend);

@@ -19,9 +19,10 @@
 #include "tests/backends/cpu/hostile/spirv_mutation.h"
 
 /// @file
-/// libFuzzer target for the way from SPIR-V to native code: any words are a program or an error that says something. A part of
-/// the inputs is made by changes that know SPIR-V, since nearly all others end in the validator. All go through the backend's own
-/// code up to a valid LLVM module, and one in eight through LLVM as well, which takes ten times as long as the rest.
+/// libFuzzer target for the way from SPIR-V to native code: any words are a program or an error that says something. A
+/// part of the inputs is made by changes that know SPIR-V, since nearly all others end in the validator. All go through
+/// the backend's own code up to a valid LLVM module, and one in eight through LLVM as well, which takes ten times as
+/// long as the rest.
 
 using nacre::hostile::MutableModule;
 using nacre::hostile::Random;
@@ -29,9 +30,11 @@ using nacre::hostile::Words;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size);
-extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size, unsigned int seed);
-extern "C" std::size_t LLVMFuzzerCustomCrossOver(const std::uint8_t* first, std::size_t first_size, const std::uint8_t* second,
-                                                 std::size_t second_size, std::uint8_t* out, std::size_t max_size, unsigned int seed);
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
+                                               unsigned int seed);
+extern "C" std::size_t LLVMFuzzerCustomCrossOver(const std::uint8_t* first, std::size_t first_size,
+                                                 const std::uint8_t* second, std::size_t second_size, std::uint8_t* out,
+                                                 std::size_t max_size, unsigned int seed);
 
 namespace {
 
@@ -91,7 +94,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         next += std::max(binding.count, 1u);
     }
     cpu::Compiler& compiler = compiler_of({data, size});
-    const cpu::ShaderSource source{.spirv = words, .entry_point = entry_point, .name = "input", .reflection = &*reflection, .slots = slots};
+    const cpu::ShaderSource source{
+        .spirv = words, .entry_point = entry_point, .name = "input", .reflection = &*reflection, .slots = slots};
     if (stage == rhi::ShaderStage::compute) {
         require_message(compiler.compile_compute(source));
     } else if (stage == rhi::ShaderStage::fragment) {
@@ -106,7 +110,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
 }
 
-extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size, unsigned int seed) {
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
+                                               unsigned int seed) {
     Random random(seed);
     if (random.chance(50)) return LLVMFuzzerMutate(data, size, max_size);
     Words words = words_of(data, size);
@@ -123,8 +128,9 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
     return bytes;
 }
 
-extern "C" std::size_t LLVMFuzzerCustomCrossOver(const std::uint8_t* first, std::size_t first_size, const std::uint8_t* second,
-                                                 std::size_t second_size, std::uint8_t* out, std::size_t max_size, unsigned int seed) {
+extern "C" std::size_t LLVMFuzzerCustomCrossOver(const std::uint8_t* first, std::size_t first_size,
+                                                 const std::uint8_t* second, std::size_t second_size, std::uint8_t* out,
+                                                 std::size_t max_size, unsigned int seed) {
     // The begin of one and the end of the other, cut where some instruction begins.
     Random random(seed);
     const auto cut = [&](const std::uint8_t* data, std::size_t size) -> std::size_t {

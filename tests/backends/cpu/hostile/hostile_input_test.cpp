@@ -107,22 +107,31 @@ TEST_P(HostileInput, LoopsWithoutEndLoseTheDevice) {
     const std::string result = "layout(local_size_x = 20) in; layout(set = 0, binding = 0) buffer R { uint r[]; };\n";
     const char* const bodies[] = {
         "void main() { while (true) r[0] += 1u; }",
-        "void main() { for (uint i = 0u; ; ++i) { r[i & 1u] += 1u; if (gl_LocalInvocationIndex == 3u) continue; if (i > 10u) break; } }",
+        "void main() { for (uint i = 0u; ; ++i) { r[i & 1u] += 1u; if (gl_LocalInvocationIndex == 3u) continue; if (i "
+        "> 10u) break; } }",
         "void main() { uint x = 1u; do { x = x * 5u + gl_LocalInvocationIndex | 1u; } while (x != 0u); r[0] = x; }",
         "shared uint s; void main() { s = 1u; while (true) { barrier(); atomicAdd(s, 2u); barrier(); } }",
-        "uint f(uint x) { while ((x & 1u) == (x & 1u)) { switch (x & 3u) { case 0u: continue; default: x += 4u; } } return x; }"
+        "uint f(uint x) { while ((x & 1u) == (x & 1u)) { switch (x & 3u) { case 0u: continue; default: x += 4u; } } "
+        "return x; }"
         "void main() { for (int i = 0; i < 5; ++i) r[i] = f(r[i]); }",
-        "void main() { for (uint a = 0u; a < 4000000000u; ++a) for (uint b = 0u; b < 4000000000u; ++b) r[a & 1u] ^= b; }",
+        "void main() { for (uint a = 0u; a < 4000000000u; ++a) for (uint b = 0u; b < 4000000000u; ++b) r[a & 1u] ^= b; "
+        "}",
     };
     for (const char* const body : bodies) {
         EXPECT_EQ(run_glsl(result + body), Outcome::lost) << body << "\n" << reason();
         EXPECT_THAT(reason(), HasSubstr("'hostile'"));
         EXPECT_THAT(reason(), HasSubstr("0.2 s"));
     }
-    EXPECT_EQ(run_glsl("layout(location = 0) out vec4 o; void main() { o = vec4(0); while (true) o += vec4(gl_FragCoord.x); }", "endless.frag"),
-              Outcome::lost) << reason();
-    EXPECT_EQ(run_glsl("void main() { gl_Position = vec4(0); while (true) gl_Position += vec4(gl_VertexIndex); }", "endless.vert"),
-              Outcome::lost) << reason();
+    EXPECT_EQ(
+        run_glsl(
+            "layout(location = 0) out vec4 o; void main() { o = vec4(0); while (true) o += vec4(gl_FragCoord.x); }",
+            "endless.frag"),
+        Outcome::lost)
+        << reason();
+    EXPECT_EQ(run_glsl("void main() { gl_Position = vec4(0); while (true) gl_Position += vec4(gl_VertexIndex); }",
+                       "endless.vert"),
+              Outcome::lost)
+        << reason();
 }
 
 TEST_P(HostileInput, MoreThanTwoToThe31WorkgroupsAreRefusedOrStopped) {
@@ -138,9 +147,11 @@ TEST_P(HostileInput, MoreThanTwoToThe31WorkgroupsAreRefusedOrStopped) {
         void main() { r[gl_WorkGroupID.x & 3u] += 1u; }
     )"}))));
     const ComputePipeline pipeline = ok(device->create_compute_pipeline({.shader = shader, .name = "many"}));
-    const Buffer buffer = ok(device->create_buffer({.size = 64, .usage = BufferUsage::storage | BufferUsage::indirect}));
-    const BindGroup group = ok(device->create_bind_group(
-        {.layout = ok(device->bind_group_layout(pipeline, 0)), .entries = {{.binding = 0, .buffer = buffer}}, .name = "many"}));
+    const Buffer buffer =
+        ok(device->create_buffer({.size = 64, .usage = BufferUsage::storage | BufferUsage::indirect}));
+    const BindGroup group = ok(device->create_bind_group({.layout = ok(device->bind_group_layout(pipeline, 0)),
+                                                          .entries = {{.binding = 0, .buffer = buffer}},
+                                                          .name = "many"}));
     const auto dispatch = [&](const DispatchArguments& arguments) -> Expected<void> {
         CommandList list = device->create_command_list("many");
         list.set_pipeline(pipeline);
@@ -182,14 +193,18 @@ TEST_P(HostileInput, HugeArraysAreErrorsThatNameTheSize) {
     }
     EXPECT_EQ(run_glsl(result + variables + "void main() { " + uses + "}"), Outcome::refused);
     // Whole ones are copied; to take long is not to hang.
-    const Outcome copied = run_glsl(result + "void main() { uint a[20000]; uint b[20000]; a[r[0] % 20000u] = 1u; b = a; r[1] = b[r[2]]; }");
+    const Outcome copied = run_glsl(
+        result + "void main() { uint a[20000]; uint b[20000]; a[r[0] % 20000u] = 1u; b = a; r[1] = b[r[2]]; }");
     EXPECT_TRUE(copied == Outcome::ran || copied == Outcome::refused) << reason();
     EXPECT_EQ(run_glsl(result + "shared uint a[16000]; void main() { a" + use), Outcome::ran) << reason();
     EXPECT_EQ(run_glsl(result + "shared uint a[20000]; void main() { a" + use), Outcome::refused);
     // A block that is larger than any buffer is bound as far as there is one.
-    EXPECT_EQ(run_glsl("layout(local_size_x = 8) in; layout(set = 0, binding = 0) buffer R { uint a[500000000]; uint b[500000000]; };"
-                       "void main() { b[gl_LocalInvocationIndex] = a[499999999] + a[3]; a[gl_LocalInvocationIndex * 100000000u] = 1u; }"),
-              Outcome::ran) << reason();
+    EXPECT_EQ(run_glsl("layout(local_size_x = 8) in; layout(set = 0, binding = 0) buffer R { uint a[500000000]; uint "
+                       "b[500000000]; };"
+                       "void main() { b[gl_LocalInvocationIndex] = a[499999999] + a[3]; a[gl_LocalInvocationIndex * "
+                       "100000000u] = 1u; }"),
+              Outcome::ran)
+        << reason();
     EXPECT_EQ(run_glsl("layout(local_size_x = 8) in; layout(set = 0, binding = 0) uniform U { uvec4 u[4000]; };"
                        "layout(set = 0, binding = 1) buffer R { uint r[]; };"
                        "void main() { r[gl_LocalInvocationIndex] = u[gl_LocalInvocationIndex * 500u].x; }"),
@@ -199,12 +214,17 @@ TEST_P(HostileInput, HugeArraysAreErrorsThatNameTheSize) {
 TEST_P(HostileInput, WholeArraysAreLoadedOrRefused) {
     // As registers they take the stack of a thread, or much time.
     for (const int count : {5000, 60000}) {
-        const std::string types = fmt::format("%n = OpConstant %uint {}\n%array = OpTypeArray %uint %n\n%array_pointer = OpTypePointer Private %array\n"
-                                              "%a = OpVariable %array_pointer Private\n%b = OpVariable %array_pointer Private\n", count);
-        std::string copies = "%x = OpAccessChain %private_pointer %a %id\n%y = OpAccessChain %private_pointer %b %id\nOpStore %x %id\n";
+        const std::string types = fmt::format(
+            "%n = OpConstant %uint {}\n%array = OpTypeArray %uint %n\n%array_pointer = OpTypePointer Private %array\n"
+            "%a = OpVariable %array_pointer Private\n%b = OpVariable %array_pointer Private\n",
+            count);
+        std::string copies =
+            "%x = OpAccessChain %private_pointer %a %id\n%y = OpAccessChain %private_pointer %b %id\nOpStore %x %id\n";
         for (int i = 0; i < 4; ++i)
-            copies += fmt::format("%v{0} = OpLoad %array %{1}\nOpStore %{2} %v{0}\nOpStore %{3} %id\n", i, i % 2 ? "b" : "a", i % 2 ? "a" : "b", i % 2 ? "x" : "y");
-        const Outcome outcome = run(assemble(head(types) + main_of(copies + "%r = OpLoad %uint %y\nOpStore %place %r\n")));
+            copies += fmt::format("%v{0} = OpLoad %array %{1}\nOpStore %{2} %v{0}\nOpStore %{3} %id\n", i,
+                                  i % 2 ? "b" : "a", i % 2 ? "a" : "b", i % 2 ? "x" : "y");
+        const Outcome outcome =
+            run(assemble(head(types) + main_of(copies + "%r = OpLoad %uint %y\nOpStore %place %r\n")));
         EXPECT_EQ(outcome, count == 5000 ? Outcome::ran : outcome) << reason();
         EXPECT_TRUE(outcome == Outcome::ran || outcome == Outcome::refused);
     }
@@ -215,12 +235,17 @@ TEST_P(HostileInput, AConstantArrayOfAQuarterOfAMillion) {
     for (int i = 0; i < 1000; ++i) constants += fmt::format("%k{} = OpConstant %uint {}\n", i, i * 7 + 3);
     for (int i = 0; i < 500; ++i) list += fmt::format(" %k{}", i);
     // 500 in a row, 500 rows: rows share their constants.
-    const std::string declarations = constants + "%n = OpConstant %uint 500\n%row = OpTypeArray %uint %n\n%rows = OpTypeArray %row %n\n"
-        "%row_value = OpConstantComposite %row" + list + "\n%table = OpConstantComposite %rows" + [] {
+    const std::string declarations =
+        constants +
+        "%n = OpConstant %uint 500\n%row = OpTypeArray %uint %n\n%rows = OpTypeArray %row %n\n"
+        "%row_value = OpConstantComposite %row" +
+        list + "\n%table = OpConstantComposite %rows" +
+        [] {
             std::string all;
             for (int i = 0; i < 500; ++i) all += " %row_value";
             return all;
-        }() + "\n%rows_pointer = OpTypePointer Private %rows\n%held = OpVariable %rows_pointer Private %table\n";
+        }() +
+        "\n%rows_pointer = OpTypePointer Private %rows\n%held = OpVariable %rows_pointer Private %table\n";
     const Outcome outcome = run(assemble(head(declarations) + main_of(
         "%at = OpAccessChain %private_pointer %held %id %id\n%v = OpLoad %uint %at\nOpStore %place %v\n")));
     EXPECT_TRUE(outcome == Outcome::ran || outcome == Outcome::refused);
@@ -230,8 +255,10 @@ TEST_P(HostileInput, DeeplyNestedSelections) {
     for (const int depth : {500, 1500}) {
         std::string open, close;
         for (int i = 0; i < depth; ++i) {
-            open += fmt::format("%b{0} = OpBitwiseAnd %uint %id %c{1}\n%t{0} = OpIEqual %bool %b{0} %c0\nOpSelectionMerge %m{0} None\n"
-                                "OpBranchConditional %t{0} %then{0} %m{0}\n%then{0} = OpLabel\n", i, i % 2 ? 1 : 7);
+            open += fmt::format(
+                "%b{0} = OpBitwiseAnd %uint %id %c{1}\n%t{0} = OpIEqual %bool %b{0} %c0\nOpSelectionMerge %m{0} None\n"
+                "OpBranchConditional %t{0} %then{0} %m{0}\n%then{0} = OpLabel\n",
+                i, i % 2 ? 1 : 7);
             close = fmt::format("OpBranch %m{0}\n%m{0} = OpLabel\n", i) + close;
         }
         const Outcome outcome = run(assemble(head() + main_of(open + "OpStore %place %c7\n" + close)));
@@ -246,10 +273,15 @@ TEST_P(HostileInput, DeeplyNestedLoops) {
     for (const int depth : {40, 120}) {
         std::string open, close;
         for (int i = 0; i < depth; ++i) {
-            open += fmt::format("OpBranch %h{0}\n%h{0} = OpLabel\nOpLoopMerge %m{0} %n{0} None\nOpBranch %o{0}\n%o{0} = OpLabel\n", i);
+            open += fmt::format(
+                "OpBranch %h{0}\n%h{0} = OpLabel\nOpLoopMerge %m{0} %n{0} None\nOpBranch %o{0}\n%o{0} = OpLabel\n", i);
             // Some invocations never leave.
-            close = fmt::format("OpBranch %n{0}\n%n{0} = OpLabel\n%t{0} = OpIEqual %bool %id %c{1}\nOpBranchConditional %t{0} %h{0} %m{0}\n"
-                                "%m{0} = OpLabel\n", i, i % 2) + close;
+            close = fmt::format(
+                        "OpBranch %n{0}\n%n{0} = OpLabel\n%t{0} = OpIEqual %bool %id %c{1}\nOpBranchConditional %t{0} "
+                        "%h{0} %m{0}\n"
+                        "%m{0} = OpLabel\n",
+                        i, i % 2) +
+                    close;
         }
         const Outcome outcome = run(assemble(head() + main_of(open + "OpStore %place %c7\n" + close)));
         EXPECT_TRUE(outcome == Outcome::ran || outcome == Outcome::refused || outcome == Outcome::lost) << depth;
@@ -263,20 +295,24 @@ TEST_P(HostileInput, DeeplyNestedTypes) {
         types += fmt::format("%deep = OpTypePointer Private %s{}\n%held = OpVariable %deep Private\n", depth);
         std::string chain = "%at = OpAccessChain %private_pointer %held";
         for (int i = 0; i <= depth; ++i) chain += " %c0";
-        const Outcome outcome = run(assemble(head(types) + main_of(
-            depth > 200 ? "OpStore %place %c7\n" : chain + "\nOpStore %at %id\n%v = OpLoad %uint %at\nOpStore %place %v\n")));
+        const Outcome outcome = run(
+            assemble(head(types) +
+                     main_of(depth > 200 ? "OpStore %place %c7\n"
+                                         : chain + "\nOpStore %at %id\n%v = OpLoad %uint %at\nOpStore %place %v\n")));
         EXPECT_TRUE(outcome == Outcome::ran || outcome == Outcome::refused) << depth;
     }
     // Each holds two of the one before: 2^24 scalars in 24 lines.
     std::string types = "%s0 = OpTypeStruct %uint\n";
     for (int i = 1; i <= 24; ++i) types += fmt::format("%s{0} = OpTypeStruct %s{1} %s{1}\n", i, i - 1);
-    EXPECT_EQ(run(assemble(head(types + "%deep = OpTypePointer Private %s24\n%held = OpVariable %deep Private\n") + main_of("OpStore %place %c7\n"))),
+    EXPECT_EQ(run(assemble(head(types + "%deep = OpTypePointer Private %s24\n%held = OpVariable %deep Private\n") +
+                           main_of("OpStore %place %c7\n"))),
               Outcome::refused);
     // Arrays of arrays whose sizes multiply beyond 64 bits.
     types = "%n = OpConstant %uint 65536\n%a0 = OpTypeArray %uint %n\n";
     for (int i = 1; i <= 5; ++i) types += fmt::format("%a{} = OpTypeArray %a{} %n\n", i, i - 1);
     EXPECT_EQ(run(assemble(head(types + "%deep = OpTypePointer Private %a5\n%held = OpVariable %deep Private\n") +
-                           main_of("%at = OpAccessChain %private_pointer %held %id %id %id %id %id %id\nOpStore %at %id\n%v = OpLoad %uint %at\n"
+                           main_of("%at = OpAccessChain %private_pointer %held %id %id %id %id %id %id\nOpStore %at "
+                                   "%id\n%v = OpLoad %uint %at\n"
                                    "OpStore %place %v\n"))),
               Outcome::refused);
 }
@@ -307,10 +343,14 @@ TEST_P(HostileInput, EnormousNumbersOfEverything) {
     std::string functions;
     constexpr int function_count = 1500;
     for (int i = 0; i < function_count; ++i)
-        functions += fmt::format("%f{0} = OpFunction %uint {1} %number_type\n%x{0} = OpFunctionParameter %uint\n%l{0} = OpLabel\n"
-                                 "%y{0} = OpIAdd %uint %x{0} %c7\n{2}OpReturnValue %{3}{0}\nOpFunctionEnd\n",
-                                 i, i % 3 ? "None" : "DontInline", i ? fmt::format("%z{0} = OpFunctionCall %uint %f{1} %y{0}\n", i, i - 1) : "", i ? "z" : "y");
-    ends_well(head() + main_of(fmt::format("%r = OpFunctionCall %uint %f{} %id\nOpStore %place %r\n", function_count - 1)) + functions);
+        functions += fmt::format(
+            "%f{0} = OpFunction %uint {1} %number_type\n%x{0} = OpFunctionParameter %uint\n%l{0} = OpLabel\n"
+            "%y{0} = OpIAdd %uint %x{0} %c7\n{2}OpReturnValue %{3}{0}\nOpFunctionEnd\n",
+            i, i % 3 ? "None" : "DontInline",
+            i ? fmt::format("%z{0} = OpFunctionCall %uint %f{1} %y{0}\n", i, i - 1) : "", i ? "z" : "y");
+    ends_well(head() +
+              main_of(fmt::format("%r = OpFunctionCall %uint %f{} %id\nOpStore %place %r\n", function_count - 1)) +
+              functions);
     std::string variables, uses;
     for (int i = 0; i < 20000; ++i) {
         variables += fmt::format("%v{} = OpVariable %local_pointer Function\n", i);
@@ -319,17 +359,22 @@ TEST_P(HostileInput, EnormousNumbersOfEverything) {
     ends_well(head() + main_of(uses + "%r = OpLoad %uint %v77\nOpStore %place %r\n", variables));
     std::string globals;
     uses.clear();
-    for (int i = 0; i < 20000; ++i) globals += fmt::format("%v{} = OpVariable %private_pointer Private\n", i), uses += fmt::format("OpStore %v{} %id\n", i);
+    for (int i = 0; i < 20000; ++i)
+        globals += fmt::format("%v{} = OpVariable %private_pointer Private\n", i),
+            uses += fmt::format("OpStore %v{} %id\n", i);
     ends_well(head(globals) + main_of(uses + "%r = OpLoad %uint %v77\nOpStore %place %r\n"));
     std::string sum = "%s0 = OpIAdd %uint %id %c7\n";
     for (int i = 1; i < 30000; ++i) sum += fmt::format("%s{0} = OpIMul %uint %s{1} %id\n", i, i - 1);
     ends_well(head() + main_of(sum + "OpStore %place %s29999\n"));
     std::string cases = "OpSelectionMerge %merge None\nOpSwitch %id %merge", blocks;
-    for (int i = 0; i < 3000; ++i) cases += fmt::format(" {} %case{}", i * 3, i), blocks += fmt::format("%case{} = OpLabel\nOpStore %place %c1\nOpBranch %merge\n", i);
+    for (int i = 0; i < 3000; ++i)
+        cases += fmt::format(" {} %case{}", i * 3, i),
+            blocks += fmt::format("%case{} = OpLabel\nOpStore %place %c1\nOpBranch %merge\n", i);
     ends_well(head() + main_of(cases + "\n" + blocks + "%merge = OpLabel\n"));
 }
 
-// What lies behind a loop that is never left cannot be reached, and a pass of SPIRV-Tools against dead code crashes on it.
+// What lies behind a loop that is never left cannot be reached, and a pass of SPIRV-Tools against dead code crashes on
+// it.
 TEST_P(HostileInput, BlocksBehindALoopWithoutEndMayBeUnreachable) {
     EXPECT_EQ(run(assemble(head() + main_of(R"(
         OpBranch %start
@@ -371,7 +416,8 @@ TEST_P(HostileInput, RecursionIsAnError) {
         OpReturnValue %y
         OpFunctionEnd
     )";
-    EXPECT_EQ(run(assemble(head() + main_of("%r = OpFunctionCall %uint %f %id\nOpStore %place %r\n") + direct)), Outcome::refused);
+    EXPECT_EQ(run(assemble(head() + main_of("%r = OpFunctionCall %uint %f %id\nOpStore %place %r\n") + direct)),
+              Outcome::refused);
     EXPECT_THAT(reason(), HasSubstr("call graph with cycles"));
     const std::string mutual = R"(
         %f = OpFunction %uint DontInline %number_type
@@ -387,14 +433,16 @@ TEST_P(HostileInput, RecursionIsAnError) {
         OpReturnValue %c
         OpFunctionEnd
     )";
-    EXPECT_EQ(run(assemble(head() + main_of("%r = OpFunctionCall %uint %f %id\nOpStore %place %r\n") + mutual)), Outcome::refused);
+    EXPECT_EQ(run(assemble(head() + main_of("%r = OpFunctionCall %uint %f %id\nOpStore %place %r\n") + mutual)),
+              Outcome::refused);
     // Also where nothing reaches it.
     EXPECT_NE(run(assemble(head() + main_of("OpStore %place %c7\n") + mutual)), Outcome::lost);
     // And where main calls itself.
     EXPECT_EQ(run(assemble(head() + main_of("%r = OpFunctionCall %void %main\n"))), Outcome::refused);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, HostileInput, testing::Values("cpu:fast:lanes=16:threads=2", "cpu:consistent:lanes=4:threads=1"),
+INSTANTIATE_TEST_SUITE_P(Devices, HostileInput,
+                         testing::Values("cpu:fast:lanes=16:threads=2", "cpu:consistent:lanes=4:threads=1"),
                          [](const auto& at) { return std::string(at.param).substr(4, 4) + std::to_string(at.index); });
 
 // ---- What the validator lets pass or nobody writes
@@ -458,16 +506,20 @@ TEST_P(OddModule, PointersAreUsedBehindTheBlockThatMakesThem) {
 
 TEST_P(OddModule, ConditionsOfSubgroupsThatAreNumbersAreRefused) {
     const auto runner = ok(ModuleRunner::create(GetParam()));
-    for (const std::string operation : {"%r = OpGroupNonUniformBallot %words %c3 %id\n", "%r = OpGroupNonUniformAll %bool %c3 %id\n",
-                                        "%r = OpGroupNonUniformAny %bool %c3 %id\n"}) {
+    for (const std::string operation :
+         {"%r = OpGroupNonUniformBallot %words %c3 %id\n", "%r = OpGroupNonUniformAll %bool %c3 %id\n",
+          "%r = OpGroupNonUniformAny %bool %c3 %id\n"}) {
         std::string text = head("%words = OpTypeVector %uint 4\n%c3 = OpConstant %uint 3\n") + main_of(operation);
-        text.insert(text.find("OpMemoryModel"), "OpCapability GroupNonUniform\nOpCapability GroupNonUniformBallot\nOpCapability GroupNonUniformVote\n");
+        text.insert(
+            text.find("OpMemoryModel"),
+            "OpCapability GroupNonUniform\nOpCapability GroupNonUniformBallot\nOpCapability GroupNonUniformVote\n");
         EXPECT_EQ(runner->run(assemble(text), ShaderStage::compute, 1), Outcome::refused) << operation;
         EXPECT_THAT(runner->reason(), HasSubstr("bool")) << operation;
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, OddModule, testing::Values("cpu:fast", "cpu:consistent:lanes=4", "cpu:double", "cpu:sanitize"),
+INSTANTIATE_TEST_SUITE_P(Devices, OddModule,
+                         testing::Values("cpu:fast", "cpu:consistent:lanes=4", "cpu:double", "cpu:sanitize"),
                          [](const auto& at) { return std::string(at.param).substr(4, 4) + std::to_string(at.index); });
 
 // ---- Indices
@@ -475,7 +527,8 @@ INSTANTIATE_TEST_SUITE_P(Devices, OddModule, testing::Values("cpu:fast", "cpu:co
 /// One of each kind of memory with known content, read and written at indices that are mostly out of range.
 class IndexOutOfRange : public testing::TestWithParam<const char*> {
   public:
-    static constexpr std::array<std::int32_t, 12> indices{0, 1, 2, 3, -1, 4, 5, 100, 65536, 1 << 28, 2147483647, -2147483647 - 1};
+    static constexpr std::array<std::int32_t, 12> indices{0, 1,   2,     3,       -1,         4,
+                                                          5, 100, 65536, 1 << 28, 2147483647, -2147483647 - 1};
     static constexpr std::uint32_t words = 64;
 
     /// `body` sets `uint got` for the invocation's index `int i`; returns that of each invocation.
@@ -487,15 +540,19 @@ class IndexOutOfRange : public testing::TestWithParam<const char*> {
             if (message.severity != MessageSeverity::info) ADD_FAILURE() << message.text;
         });
         ShaderCompiler compiler({});
-        const Shader shader = ok(device->create_shader(ok(compiler.compile({.path = "index.comp", .text = R"(
+        const Shader shader = ok(device->create_shader(ok(compiler.compile(
+            {.path = "index.comp",
+             .text = R"(
             #extension GL_EXT_nonuniform_qualifier : require
             layout(local_size_x = 12) in;
             layout(set = 0, binding = 0) buffer Result { uint result[12]; };
             layout(set = 0, binding = 1) readonly buffer Indices { int indices[12]; };
-        )" + declarations + "\nvoid main() { uint id = gl_LocalInvocationIndex; int i = indices[id]; uint got = 999u;\n" + body +
-                                                                                      "\nresult[id] = got; }\n"}))));
+        )" + declarations +
+                     "\nvoid main() { uint id = gl_LocalInvocationIndex; int i = indices[id]; uint got = 999u;\n" +
+                     body + "\nresult[id] = got; }\n"}))));
         const ComputePipeline pipeline = ok(device->create_compute_pipeline({.shader = shader, .name = "index"}));
-        const auto usage = BufferUsage::storage | BufferUsage::uniform | BufferUsage::copy_source | BufferUsage::copy_destination;
+        const auto usage =
+            BufferUsage::storage | BufferUsage::uniform | BufferUsage::copy_source | BufferUsage::copy_destination;
         const auto buffer = [&](std::vector<std::uint32_t> content) {
             const Buffer made = ok(device->create_buffer({.size = content.size() * 4, .usage = usage}));
             EXPECT_TRUE(device->write_buffer(made, std::span<const std::uint32_t>(content)));
@@ -510,8 +567,12 @@ class IndexOutOfRange : public testing::TestWithParam<const char*> {
         const Buffer index_buffer = buffer(numbers);
         std::vector<Texture> textures;
         const auto texture = [&](TextureUsage texture_usage) {
-            textures.push_back(ok(device->create_texture({.format = Format::r32_uint, .width = 4, .height = 4, .layers = 4,
-                                                          .usage = texture_usage | TextureUsage::copy_source | TextureUsage::copy_destination})));
+            textures.push_back(ok(device->create_texture(
+                {.format = Format::r32_uint,
+                 .width = 4,
+                 .height = 4,
+                 .layers = 4,
+                 .usage = texture_usage | TextureUsage::copy_source | TextureUsage::copy_destination})));
             for (std::uint32_t layer = 0; layer < 4; ++layer) {
                 Words texels(16);
                 for (std::uint32_t t = 0; t < 16; ++t) texels[t] = 1000 + t + 100 * (layer - 1);
@@ -521,7 +582,8 @@ class IndexOutOfRange : public testing::TestWithParam<const char*> {
             view.base_layer = 1;
             return view;
         };
-        const Sampler sampler = ok(device->create_sampler({.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest}));
+        const Sampler sampler =
+            ok(device->create_sampler({.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest}));
         std::vector<BindGroupEntry> entries;
         const BindGroupLayout layout = ok(device->bind_group_layout(pipeline, 0));
         for (const BindingLayout& binding : ok(device->describe(layout)).bindings)
@@ -533,13 +595,24 @@ class IndexOutOfRange : public testing::TestWithParam<const char*> {
                     // Four words are bound of each; in front and behind lies what may be neither read nor written.
                     case 2: entry.buffer = storage, entry.offset = words * 4, entry.size = 16; break;
                     case 3: entry.buffer = uniform, entry.offset = words * 4, entry.size = 16; break;
-                    case 4: entry.texture = texture(TextureUsage::storage), entry.texture.dimension = ViewDimension::d2, entry.texture.layer_count = 1; break;
-                    case 5: entry.texture = texture(TextureUsage::storage), entry.texture.dimension = ViewDimension::d2_array, entry.texture.layer_count = 2; break;
-                    case 6: entry.texture = texture(TextureUsage::sampled), entry.texture.dimension = ViewDimension::d2_array, entry.texture.layer_count = 2,
-                            entry.sampler = sampler; break;
+                    case 4:
+                        entry.texture = texture(TextureUsage::storage), entry.texture.dimension = ViewDimension::d2,
+                        entry.texture.layer_count = 1;
+                        break;
+                    case 5:
+                        entry.texture = texture(TextureUsage::storage),
+                        entry.texture.dimension = ViewDimension::d2_array, entry.texture.layer_count = 2;
+                        break;
+                    case 6:
+                        entry.texture = texture(TextureUsage::sampled),
+                        entry.texture.dimension = ViewDimension::d2_array, entry.texture.layer_count = 2,
+                        entry.sampler = sampler;
+                        break;
                     case 7: entry.buffer = buffer(Words(4, 50 + element)); break;
-                    default: entry.texture = texture(TextureUsage::sampled), entry.texture.dimension = ViewDimension::d2, entry.texture.layer_count = 1,
-                             entry.sampler = sampler; break;
+                    default:
+                        entry.texture = texture(TextureUsage::sampled), entry.texture.dimension = ViewDimension::d2,
+                        entry.texture.layer_count = 1, entry.sampler = sampler;
+                        break;
                 }
                 entries.push_back(entry);
             }
@@ -547,7 +620,8 @@ class IndexOutOfRange : public testing::TestWithParam<const char*> {
         CommandList list = device->create_command_list("index");
         list.set_pipeline(pipeline);
         list.set_bind_group(0, group);
-        if (declarations.find("push_constant") != std::string::npos) list.set_push_constants(std::array<std::uint32_t, 4>{1000, 1001, 1002, 1003});
+        if (declarations.find("push_constant") != std::string::npos)
+            list.set_push_constants(std::array<std::uint32_t, 4>{1000, 1001, 1002, 1003});
         list.dispatch({});
         EXPECT_TRUE(device->wait(ok(device->submit(std::move(list)))));
         const auto read = [&](Buffer from) {
@@ -567,7 +641,8 @@ class IndexOutOfRange : public testing::TestWithParam<const char*> {
                 const auto bytes = ok(device->read_texture(at, 0, layer));
                 Words texels(16);
                 std::memcpy(texels.data(), bytes.data(), std::min<std::size_t>(bytes.size(), 64));
-                for (std::uint32_t t = 0; t < 16; ++t) EXPECT_EQ(texels[t], 1000 + t + 100 * (layer - 1)) << "layer " << layer;
+                for (std::uint32_t t = 0; t < 16; ++t)
+                    EXPECT_EQ(texels[t], 1000 + t + 100 * (layer - 1)) << "layer " << layer;
             }
         return read(result);
     }
@@ -576,7 +651,8 @@ class IndexOutOfRange : public testing::TestWithParam<const char*> {
         const Words got = evaluate(declarations, body);
         for (std::size_t at = 0; at < indices.size(); ++at) {
             const bool is_inside = indices[at] >= 0 && static_cast<std::uint32_t>(indices[at]) < count;
-            EXPECT_EQ(got[at], is_inside ? 1000u + static_cast<std::uint32_t>(indices[at]) : 0u) << "index " << indices[at] << " of " << body;
+            EXPECT_EQ(got[at], is_inside ? 1000u + static_cast<std::uint32_t>(indices[at]) : 0u)
+                << "index " << indices[at] << " of " << body;
         }
     }
 };
@@ -586,36 +662,49 @@ TEST_P(IndexOutOfRange, ReadsZeroOfEveryMemory) {
     expect_zero_beyond(4, "layout(set = 0, binding = 2) buffer S { uint s[1000000]; };", "got = s[i];");
     expect_zero_beyond(4, "layout(set = 0, binding = 2) buffer S { uvec2 pairs[]; };",
                        "got = i >= 0 && i < 4 ? pairs[i >> 1][i & 1] : pairs[i][1] + pairs[i | 2].x;");
-    expect_zero_beyond(4, "struct T { uint a; }; struct U { T t[2]; }; layout(set = 0, binding = 2) buffer S { U u[]; };",
+    expect_zero_beyond(4,
+                       "struct T { uint a; }; struct U { T t[2]; }; layout(set = 0, binding = 2) buffer S { U u[]; };",
                        "got = i >= 0 && i < 4 ? u[i >> 1].t[i & 1].a : u[i].t[0].a + u[0].t[i].a;");
     expect_zero_beyond(1, "layout(set = 0, binding = 3) uniform U { uvec4 u[8]; };", "got = u[i].x;");
     expect_zero_beyond(4, "layout(push_constant) uniform P { uint p[4]; };", "got = p[i];");
-    expect_zero_beyond(4, "", "uint a[4] = uint[4](1000u, 1001u, 1002u, 1003u); a[id & 3u] = 1000u + (id & 3u); got = a[i];");
+    expect_zero_beyond(4, "",
+                       "uint a[4] = uint[4](1000u, 1001u, 1002u, 1003u); a[id & 3u] = 1000u + (id & 3u); got = a[i];");
     expect_zero_beyond(4, "uint a[4];", "for (uint j = 0u; j < 4u; ++j) a[j] = 1000u + j + id - id; got = a[i];");
     expect_zero_beyond(4, "const uint a[4] = uint[4](1000u, 1001u, 1002u, 1003u);", "got = a[i];");
     expect_zero_beyond(4, "shared uint a[4];", "if (id < 4u) a[id] = 1000u + id; barrier(); got = a[i];");
     expect_zero_beyond(3, "", "uvec3 v = uvec3(1000u, 1001u, 1002u) + id - id; got = v[i];");
-    expect_zero_beyond(4, "", "mat4 m = mat4(0.0); for (int j = 0; j < 4; ++j) m[j][2] = 1000.0 + float(j); got = uint(m[i][2]);");
-    expect_zero_beyond(4, "", "mat4 m = mat4(0.0); for (int j = 0; j < 4; ++j) m[1][j] = 1000.0 + float(j); got = uint(m[1][i]);");
-    expect_zero_beyond(2, "layout(set = 0, binding = 2, row_major) buffer S { mat2 m[]; };", "got = floatBitsToUint(m[0][0][i]) - (i == 1 ? 1u : 0u);");
-    expect_zero_beyond(4, "layout(set = 0, binding = 4, r32ui) uniform uimage2D image;", "got = imageLoad(image, ivec2(i, 0)).x;");
+    expect_zero_beyond(
+        4, "", "mat4 m = mat4(0.0); for (int j = 0; j < 4; ++j) m[j][2] = 1000.0 + float(j); got = uint(m[i][2]);");
+    expect_zero_beyond(
+        4, "", "mat4 m = mat4(0.0); for (int j = 0; j < 4; ++j) m[1][j] = 1000.0 + float(j); got = uint(m[1][i]);");
+    expect_zero_beyond(2, "layout(set = 0, binding = 2, row_major) buffer S { mat2 m[]; };",
+                       "got = floatBitsToUint(m[0][0][i]) - (i == 1 ? 1u : 0u);");
+    expect_zero_beyond(4, "layout(set = 0, binding = 4, r32ui) uniform uimage2D image;",
+                       "got = imageLoad(image, ivec2(i, 0)).x;");
     expect_zero_beyond(2, "layout(set = 0, binding = 5, r32ui) uniform uimage2DArray image;",
                        "got = imageLoad(image, ivec3(0, 0, i)).x; if (i == 1) got -= 99u;");
-    expect_zero_beyond(4, "layout(set = 0, binding = 6) uniform usampler2DArray image;", "got = texelFetch(image, ivec3(0, 0, 0) + ivec3(i, 0, 0), 0).x;");
+    expect_zero_beyond(4, "layout(set = 0, binding = 6) uniform usampler2DArray image;",
+                       "got = texelFetch(image, ivec3(0, 0, 0) + ivec3(i, 0, 0), 0).x;");
     expect_zero_beyond(2, "layout(set = 0, binding = 6) uniform usampler2DArray image;",
                        "got = texelFetch(image, ivec3(0, 0, i), 0).x; if (i == 1) got -= 99u;");
     // Levels that do not exist.
-    expect_zero_beyond(1, "layout(set = 0, binding = 6) uniform usampler2DArray image;", "got = texelFetch(image, ivec3(0), i).x;");
+    expect_zero_beyond(1, "layout(set = 0, binding = 6) uniform usampler2DArray image;",
+                       "got = texelFetch(image, ivec3(0), i).x;");
 }
 
 TEST_P(IndexOutOfRange, DescriptorsOfArraysReadZero) {
-    const Words got = evaluate("layout(set = 0, binding = 7) buffer S { uint s[]; } all[3];", "got = all[nonuniformEXT(i)].s[1];");
+    const Words got =
+        evaluate("layout(set = 0, binding = 7) buffer S { uint s[]; } all[3];", "got = all[nonuniformEXT(i)].s[1];");
     for (std::size_t at = 0; at < indices.size(); ++at)
-        EXPECT_EQ(got[at], indices[at] >= 0 && indices[at] < 3 ? 50u + static_cast<std::uint32_t>(indices[at]) : 0u) << indices[at];
+        EXPECT_EQ(got[at], indices[at] >= 0 && indices[at] < 3 ? 50u + static_cast<std::uint32_t>(indices[at]) : 0u)
+            << indices[at];
     const Words texels = evaluate("layout(set = 0, binding = 8) uniform usampler2D all[3];",
-                                  "got = texelFetch(all[nonuniformEXT(i)], ivec2(1, 0), 0).x + texelFetch(all[nonuniformEXT(i)], ivec2(i, 0), 0).x;");
+                                  "got = texelFetch(all[nonuniformEXT(i)], ivec2(1, 0), 0).x + "
+                                  "texelFetch(all[nonuniformEXT(i)], ivec2(i, 0), 0).x;");
     for (std::size_t at = 0; at < indices.size(); ++at)
-        EXPECT_EQ(texels[at], indices[at] >= 0 && indices[at] < 3 ? 2001u + static_cast<std::uint32_t>(indices[at]) : 0u) << indices[at];
+        EXPECT_EQ(texels[at],
+                  indices[at] >= 0 && indices[at] < 3 ? 2001u + static_cast<std::uint32_t>(indices[at]) : 0u)
+            << indices[at];
 }
 
 TEST_P(IndexOutOfRange, WritesAreDropped) {
@@ -625,31 +714,51 @@ TEST_P(IndexOutOfRange, WritesAreDropped) {
     };
     const std::string outside = "if (i < 0 || i > 3) ";
     expect_all("layout(set = 0, binding = 2) buffer S { uint s[]; };",
-               outside + "{ s[i] = 7u; atomicAdd(s[i], 5u); atomicExchange(s[i ^ 0x40000000], 3u); } barrier(); got = s[0] + s[1] + s[2] + s[3];", 4006);
-    expect_all("layout(set = 0, binding = 2) buffer S { uvec4 s[]; };", outside + "s[i] = uvec4(7u); barrier(); got = s[0].x + s[0].w;", 2003);
-    expect_all("layout(set = 0, binding = 2) buffer S { uvec4 s; };", outside + "s[i] = 7u; barrier(); got = s.x + s.w;", 2003);
+               outside +
+                   "{ s[i] = 7u; atomicAdd(s[i], 5u); atomicExchange(s[i ^ 0x40000000], 3u); } barrier(); got = s[0] + "
+                   "s[1] + s[2] + s[3];",
+               4006);
+    expect_all("layout(set = 0, binding = 2) buffer S { uvec4 s[]; };",
+               outside + "s[i] = uvec4(7u); barrier(); got = s[0].x + s[0].w;", 2003);
+    expect_all("layout(set = 0, binding = 2) buffer S { uvec4 s; };",
+               outside + "s[i] = 7u; barrier(); got = s.x + s.w;", 2003);
     expect_all("shared uint before[8]; shared uint a[4]; shared uint behind[8];",
                "if (id < 8u) before[id] = 1u, behind[id] = 1u, a[id & 3u] = 1u; barrier();" + outside +
-                   "{ a[i] = 7u; atomicAdd(a[i], 3u); } barrier(); got = 0u; for (int j = 0; j < 8; ++j) got += before[j] + behind[j] + a[j & 3];", 24);
+                   "{ a[i] = 7u; atomicAdd(a[i], 3u); } barrier(); got = 0u; for (int j = 0; j < 8; ++j) got += "
+                   "before[j] + behind[j] + a[j & 3];",
+               24);
     expect_all("uint before[8]; uint a[4]; uint behind[8];",
                "for (int j = 0; j < 8; ++j) before[j] = 1u, behind[j] = 1u, a[j & 3] = 1u;" + outside +
                    "a[i] = 7u; got = 0u; for (int j = 0; j < 8; ++j) got += before[j] + behind[j] + a[j & 3];", 24);
-    expect_all("", "uint before[8], a[4], behind[8]; for (int j = 0; j < 8; ++j) before[j] = 1u, behind[j] = 1u, a[j & 3] = 1u;" + outside +
-                       "a[i] = 7u; got = 0u; for (int j = 0; j < 8; ++j) got += before[j] + behind[j] + a[j & 3];", 24);
+    expect_all(
+        "",
+        "uint before[8], a[4], behind[8]; for (int j = 0; j < 8; ++j) before[j] = 1u, behind[j] = 1u, a[j & 3] = 1u;" +
+            outside + "a[i] = 7u; got = 0u; for (int j = 0; j < 8; ++j) got += before[j] + behind[j] + a[j & 3];",
+        24);
     expect_all("", "uvec4 v = uvec4(1u); " + outside + "v[i] = 7u; got = v.x + v.y + v.z + v.w;", 4);
-    expect_all("", "mat3 m = mat3(1.0); if (i < 0 || i > 2) { m[i] = vec3(7.0); m[1][i] = 7.0; m[i][i] = 7.0; } got = uint(m[0][0] + m[1][1] + m[2][2]);", 3);
+    expect_all("",
+               "mat3 m = mat3(1.0); if (i < 0 || i > 2) { m[i] = vec3(7.0); m[1][i] = 7.0; m[i][i] = 7.0; } got = "
+               "uint(m[0][0] + m[1][1] + m[2][2]);",
+               3);
     expect_all("layout(set = 0, binding = 4, r32ui) uniform uimage2D image;",
-               outside + "{ imageStore(image, ivec2(i, 1), uvec4(7u)); imageStore(image, ivec2(0, i), uvec4(7u)); imageAtomicAdd(image, ivec2(i, i), 1u); }"
-                         "barrier(); got = imageLoad(image, ivec2(0, 1)).x + imageLoad(image, ivec2(3, 3)).x;", 2019);
+               outside +
+                   "{ imageStore(image, ivec2(i, 1), uvec4(7u)); imageStore(image, ivec2(0, i), uvec4(7u)); "
+                   "imageAtomicAdd(image, ivec2(i, i), 1u); }"
+                   "barrier(); got = imageLoad(image, ivec2(0, 1)).x + imageLoad(image, ivec2(3, 3)).x;",
+               2019);
     expect_all("layout(set = 0, binding = 5, r32ui) uniform uimage2DArray image;",
-               "if (i < 0 || i > 1) { imageStore(image, ivec3(0, 0, i), uvec4(7u)); imageAtomicMax(image, ivec3(0, 0, i), 5000u); }"
-               "barrier(); got = imageLoad(image, ivec3(0)).x + imageLoad(image, ivec3(0, 0, 1)).x;", 2100);
+               "if (i < 0 || i > 1) { imageStore(image, ivec3(0, 0, i), uvec4(7u)); imageAtomicMax(image, ivec3(0, 0, "
+               "i), 5000u); }"
+               "barrier(); got = imageLoad(image, ivec3(0)).x + imageLoad(image, ivec3(0, 0, 1)).x;",
+               2100);
     expect_all("layout(set = 0, binding = 7) buffer S { uint s[]; } all[3];",
-               outside + "all[nonuniformEXT(i)].s[0] = 7u; barrier(); got = all[0].s[0] + all[1].s[0] + all[2].s[0];", 153);
+               outside + "all[nonuniformEXT(i)].s[0] = 7u; barrier(); got = all[0].s[0] + all[1].s[0] + all[2].s[0];",
+               153);
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, IndexOutOfRange,
-                         testing::Values("cpu:fast:lanes=16:threads=1", "cpu:consistent:lanes=4:threads=1", "cpu:fast:lanes=8:threads=1"),
+                         testing::Values("cpu:fast:lanes=16:threads=1", "cpu:consistent:lanes=4:threads=1",
+                                         "cpu:fast:lanes=8:threads=1"),
                          [](const auto& at) { return std::string(at.param).substr(4, 4) + std::to_string(at.index); });
 
 }  // namespace

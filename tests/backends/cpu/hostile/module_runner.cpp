@@ -64,8 +64,8 @@ std::string vertex_for(const ShaderReflection& fragment) {
         const std::string type = input.components == 1 ? scalar : fmt::format("{}{}", vector, input.components);
         for (std::uint32_t i = 0; i < input.locations; ++i) {
             const std::string name = fmt::format("v{}_{}", input.location + i, input.first_component);
-            declarations += fmt::format("layout(location = {}, component = {}) {}out {} {};\n", input.location + i, input.first_component,
-                                        is_float ? "" : "flat ", type, name);
+            declarations += fmt::format("layout(location = {}, component = {}) {}out {} {};\n", input.location + i,
+                                        input.first_component, is_float ? "" : "flat ", type, name);
             stores += fmt::format("    {} = {}(corner.x * 7.0 + float({}));\n", name, type, input.location);
         }
     }
@@ -76,7 +76,9 @@ void main() {
 }
 
 Format format_of(FormatKind kind) {
-    return kind == FormatKind::uint ? Format::rgba32_uint : kind == FormatKind::sint ? Format::rgba32_sint : Format::rgba32_float;
+    return kind == FormatKind::uint   ? Format::rgba32_uint
+           : kind == FormatKind::sint ? Format::rgba32_sint
+                                      : Format::rgba32_float;
 }
 
 }  // namespace
@@ -84,7 +86,8 @@ Format format_of(FormatKind kind) {
 struct ModuleRunner::Objects {
     Instance instance{all_backends()};
     std::unique_ptr<Device> device;
-    /// The second has the same content for bindings that cannot be written: one buffer must not be both in one dispatch.
+    /// The second has the same content for bindings that cannot be written: one buffer must not be both in one
+    /// dispatch.
     Buffer arena, read_arena, kernel_result;
     ComputePipeline kernel;
     BindGroup kernel_group;
@@ -120,7 +123,8 @@ struct ModuleRunner::Objects {
 };
 
 Expected<TextureView> ModuleRunner::Objects::view_for(const ReflectedBinding& binding) {
-    const bool is_image = binding.type == BindingType::storage_image || binding.type == BindingType::readonly_storage_image ||
+    const bool is_image = binding.type == BindingType::storage_image ||
+                          binding.type == BindingType::readonly_storage_image ||
                           binding.type == BindingType::writeonly_storage_image;
     TextureDesc desc;
     desc.width = side, desc.height = side;
@@ -134,19 +138,24 @@ Expected<TextureView> ModuleRunner::Objects::view_for(const ReflectedBinding& bi
     view.dimension = binding.dimension;
     switch (binding.dimension) {
         case ViewDimension::d1: desc.dimension = TextureDimension::d1, desc.height = 1, desc.mips = 1; break;
-        case ViewDimension::d1_array: desc.dimension = TextureDimension::d1, desc.height = 1, desc.mips = 1, desc.layers = 3; break;
+        case ViewDimension::d1_array:
+            desc.dimension = TextureDimension::d1, desc.height = 1, desc.mips = 1, desc.layers = 3;
+            break;
         case ViewDimension::d2_array: desc.layers = 4, view.base_layer = 1, view.layer_count = 2; break;
         case ViewDimension::d3: desc.dimension = TextureDimension::d3, desc.depth = 4; break;
         case ViewDimension::cube: desc.dimension = TextureDimension::cube, desc.layers = 6; break;
         case ViewDimension::cube_array: desc.dimension = TextureDimension::cube, desc.layers = 12; break;
-        default: desc.layers = binding.multisampled ? 1 : 3; if (!binding.multisampled) view.base_layer = 1, view.layer_count = 1; break;
+        default:
+            desc.layers = binding.multisampled ? 1 : 3;
+            if (!binding.multisampled) view.base_layer = 1, view.layer_count = 1;
+            break;
     }
     if (binding.multisampled) {
         desc.samples = 4, desc.mips = 1;
         desc.usage = (is_image ? TextureUsage::storage : TextureUsage::sampled) | TextureUsage::color_target;
     }
-    const std::string key = fmt::format("{} {} {} {} {}", static_cast<int>(desc.dimension), static_cast<int>(desc.format), desc.layers,
-                                        desc.samples, is_image);
+    const std::string key = fmt::format("{} {} {} {} {}", static_cast<int>(desc.dimension),
+                                        static_cast<int>(desc.format), desc.layers, desc.samples, is_image);
     NACRE_TRY(view.texture, texture(key, desc));
     return view;
 }
@@ -162,7 +171,8 @@ Expected<BindGroupEntry> ModuleRunner::Objects::entry_for(const ReflectedBinding
             entry.offset = first_region + region * region_stride;
             entry.size = random.pick({std::uint64_t{16}, std::uint64_t{64}, std::uint64_t{256}, std::uint64_t{512}});
             // Some backends want all of a block; here what is not bound reads zero.
-            if (binding.block_size > entry.size && random.chance(80)) entry.size = std::min<std::uint64_t>((binding.block_size + 15) / 16 * 16, 512);
+            if (binding.block_size > entry.size && random.chance(80))
+                entry.size = std::min<std::uint64_t>((binding.block_size + 15) / 16 * 16, 512);
             regions.emplace_back(entry.offset, entry.offset + entry.size);
             break;
         }
@@ -213,38 +223,50 @@ ModuleRunner::~ModuleRunner() = default;
 Expected<void> ModuleRunner::make_device() {
     objects_ = std::make_unique<Objects>();
     Objects& at = *objects_;
-    NACRE_TRY(at.device, at.instance.create_device({.backend = spec_, .validation = false, .debug_names = false, .name = "hostile"}));
+    NACRE_TRY(at.device, at.instance.create_device(
+                             {.backend = spec_, .validation = false, .debug_names = false, .name = "hostile"}));
     Device& device = *at.device;
     device.set_message_callback([](const Message&) {});
     Random random(7);
     at.content.resize(arena_bytes / 4);
     for (std::uint32_t& word : at.content)
-        word = random.chance(50) ? static_cast<std::uint32_t>(random.below(40)) : static_cast<std::uint32_t>(random.next());
-    const auto usage = BufferUsage::storage | BufferUsage::uniform | BufferUsage::uniform_texel | BufferUsage::storage_texel |
-                       BufferUsage::vertex | BufferUsage::copy_source | BufferUsage::copy_destination;
+        word = random.chance(50) ? static_cast<std::uint32_t>(random.below(40))
+                                 : static_cast<std::uint32_t>(random.next());
+    const auto usage = BufferUsage::storage | BufferUsage::uniform | BufferUsage::uniform_texel |
+                       BufferUsage::storage_texel | BufferUsage::vertex | BufferUsage::copy_source |
+                       BufferUsage::copy_destination;
     NACRE_TRY(at.arena, device.create_buffer({.size = arena_bytes, .usage = usage, .name = "arena"}));
     NACRE_CHECK(device.write_buffer(at.arena, std::span<const std::uint32_t>(at.content)));
     NACRE_TRY(at.read_arena, device.create_buffer({.size = arena_bytes, .usage = usage, .name = "read arena"}));
     NACRE_CHECK(device.write_buffer(at.read_arena, std::span<const std::uint32_t>(at.content)));
-    NACRE_TRY(at.kernel_result, device.create_buffer({.size = kernel_invocations * 4, .usage = usage, .name = "known"}));
+    NACRE_TRY(at.kernel_result,
+              device.create_buffer({.size = kernel_invocations * 4, .usage = usage, .name = "known"}));
     NACRE_TRY(const Shader kernel, make_shader(device, "known.comp", known_kernel));
     NACRE_TRY(at.kernel, device.create_compute_pipeline({.shader = kernel, .name = "known"}));
     NACRE_TRY(const BindGroupLayout layout, device.bind_group_layout(at.kernel, 0));
-    NACRE_TRY(at.kernel_group, device.create_bind_group({.layout = layout, .entries = {{.binding = 0, .buffer = at.kernel_result}}, .name = "known"}));
+    NACRE_TRY(at.kernel_group,
+              device.create_bind_group(
+                  {.layout = layout, .entries = {{.binding = 0, .buffer = at.kernel_result}}, .name = "known"}));
     NACRE_TRY(at.sampler, device.create_sampler({.max_anisotropy = 2.0f}));
-    NACRE_TRY(at.nearest_sampler, device.create_sampler({.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest}));
+    NACRE_TRY(at.nearest_sampler,
+              device.create_sampler({.magnify = Filter::nearest, .minify = Filter::nearest, .mip = Filter::nearest}));
     NACRE_TRY(at.comparison_sampler, device.create_sampler({.comparison = true}));
     NACRE_TRY(at.fragment, make_shader(device, "plain.frag", plain_fragment));
 
     constexpr std::array<float, 18> corners{-1, -1, 1, 3, -1, 1, -1, 3, 1, -1, -1, 2, 3, -1, 2, -1, 3, 2};
-    NACRE_TRY(const Buffer vertices, device.create_buffer({.size = sizeof(corners), .usage = BufferUsage::acceleration_structure_input | usage}));
+    NACRE_TRY(
+        const Buffer vertices,
+        device.create_buffer({.size = sizeof(corners), .usage = BufferUsage::acceleration_structure_input | usage}));
     NACRE_CHECK(device.write_buffer(vertices, std::span<const float>(corners)));
-    NACRE_TRY(at.bottom, device.create_acceleration_structure({.geometries = {{.primitive_count = 2, .vertex_count = 6}}, .name = "bottom"}));
-    NACRE_TRY(at.top, device.create_acceleration_structure({.level = AccelerationStructureLevel::top, .max_instances = 2, .name = "top"}));
+    NACRE_TRY(at.bottom, device.create_acceleration_structure(
+                             {.geometries = {{.primitive_count = 2, .vertex_count = 6}}, .name = "bottom"}));
+    NACRE_TRY(at.top, device.create_acceleration_structure(
+                          {.level = AccelerationStructureLevel::top, .max_instances = 2, .name = "top"}));
     CommandList list = device.create_command_list("build");
     const std::array<GeometrySource, 1> sources{{{.vertices = vertices}}};
     list.build_acceleration_structure(at.bottom, sources);
-    const std::array<AccelerationStructureInstance, 2> instances{{{.bottom_level = at.bottom}, {.bottom_level = at.bottom, .flags = InstanceFlags::force_no_opaque}}};
+    const std::array<AccelerationStructureInstance, 2> instances{
+        {{.bottom_level = at.bottom}, {.bottom_level = at.bottom, .flags = InstanceFlags::force_no_opaque}}};
     list.build_acceleration_structure(at.top, instances);
     NACRE_TRY(const Fence fence, device.submit(std::move(list)));
     return device.wait(fence);
@@ -287,7 +309,8 @@ bool ModuleRunner::is_sound() {
             return false;
         }
     const std::vector<std::byte> zeros(kernel_invocations * 4);
-    if (const auto cleared = at.device->write_buffer(at.kernel_result, std::span<const std::byte>(zeros)); !cleared) return failed(cleared.error());
+    if (const auto cleared = at.device->write_buffer(at.kernel_result, std::span<const std::byte>(zeros)); !cleared)
+        return failed(cleared.error());
     return true;
 }
 
@@ -295,7 +318,8 @@ Expected<void> ModuleRunner::try_run(const std::vector<std::uint32_t>& words, Sh
     Objects& at = *objects_;
     Device& device = *at.device;
     Random random(seed);
-    for (const Buffer buffer : {at.arena, at.read_arena}) NACRE_CHECK(device.write_buffer(buffer, std::span<const std::uint32_t>(at.content)));
+    for (const Buffer buffer : {at.arena, at.read_arena})
+        NACRE_CHECK(device.write_buffer(buffer, std::span<const std::uint32_t>(at.content)));
     NACRE_TRY(at.shader, device.create_shader({.spirv = words, .stage = stage, .name = "hostile"}));
     NACRE_TRY(const ShaderReflection reflection, device.reflection(at.shader));
     std::vector<ColorAttachment> colors;
@@ -306,12 +330,17 @@ Expected<void> ModuleRunner::try_run(const std::vector<std::uint32_t>& words, Sh
         GraphicsPipelineDesc desc{.vertex = at.shader, .fragment = at.fragment, .name = "hostile"};
         const auto add_target = [&](Format format) -> Expected<void> {
             const std::string key = fmt::format("target {} {}", static_cast<int>(format), colors.size());
-            NACRE_TRY(const Texture target, at.texture(key, {.format = format, .width = side, .height = side, .usage = TextureUsage::color_target}));
+            NACRE_TRY(const Texture target,
+                      at.texture(
+                          key, {.format = format, .width = side, .height = side, .usage = TextureUsage::color_target}));
             colors.push_back({.view = target, .load = LoadOperation::clear});
-            const bool is_written = stage == ShaderStage::vertex || std::ranges::any_of(reflection.outputs, [&](const ReflectedVariable& output) {
-                return output.index == 0 && colors.size() > output.location && colors.size() <= output.location + output.locations;
-            });
-            desc.color_targets.push_back({.format = format, .write_mask = static_cast<std::uint8_t>(is_written ? 15 : 0)});
+            const bool is_written = stage == ShaderStage::vertex ||
+                                    std::ranges::any_of(reflection.outputs, [&](const ReflectedVariable& output) {
+                                        return output.index == 0 && colors.size() > output.location &&
+                                               colors.size() <= output.location + output.locations;
+                                    });
+            desc.color_targets.push_back(
+                {.format = format, .write_mask = static_cast<std::uint8_t>(is_written ? 15 : 0)});
             return {};
         };
         if (stage == ShaderStage::fragment) {
@@ -324,7 +353,8 @@ Expected<void> ModuleRunner::try_run(const std::vector<std::uint32_t>& words, Sh
                 at.vertices.emplace(text, desc.vertex);
             }
             std::uint32_t targets = 0;
-            for (const ReflectedVariable& output : reflection.outputs) targets = std::max(targets, output.location + output.locations);
+            for (const ReflectedVariable& output : reflection.outputs)
+                targets = std::max(targets, output.location + output.locations);
             for (std::uint32_t i = 0; i < std::min(targets, 8u); ++i) {
                 FormatKind kind = FormatKind::floating;
                 for (const ReflectedVariable& output : reflection.outputs)
@@ -332,15 +362,22 @@ Expected<void> ModuleRunner::try_run(const std::vector<std::uint32_t>& words, Sh
                 NACRE_CHECK(add_target(format_of(kind)));
             }
             if (reflection.writes_depth) {
-                NACRE_TRY(const Texture target, at.texture("depth", {.format = Format::d32_float, .width = side, .height = side, .usage = TextureUsage::depth_target}));
+                NACRE_TRY(const Texture target, at.texture("depth", {.format = Format::d32_float,
+                                                                     .width = side,
+                                                                     .height = side,
+                                                                     .usage = TextureUsage::depth_target}));
                 depth = {.view = target, .depth_load = LoadOperation::clear};
-                desc.depth_stencil = {.format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::always};
+                desc.depth_stencil = {.format = Format::d32_float,
+                                      .depth_test = true,
+                                      .depth_write = true,
+                                      .depth_compare = CompareOperation::always};
             }
         } else {
             NACRE_CHECK(add_target(Format::rgba8_unorm));
             for (const ReflectedVariable& input : reflection.inputs)
                 for (std::uint32_t i = 0; i < input.locations; ++i)
-                    desc.vertex_attributes.push_back({.location = input.location + i, .buffer = 0, .offset = 0, .format = format_of(input.kind)});
+                    desc.vertex_attributes.push_back(
+                        {.location = input.location + i, .buffer = 0, .offset = 0, .format = format_of(input.kind)});
             if (!desc.vertex_attributes.empty()) desc.vertex_buffers = {{.stride = 16}};
             desc.topology = random.pick({Topology::triangle_list, Topology::point_list, Topology::line_strip});
         }
@@ -357,12 +394,15 @@ Expected<void> ModuleRunner::try_run(const std::vector<std::uint32_t>& words, Sh
         }
     }
     CommandList list = device.create_command_list("hostile");
-    if (stage != ShaderStage::compute) list.begin_render_pass({.color = colors, .depth_stencil = depth, .name = "hostile"});
+    if (stage != ShaderStage::compute)
+        list.begin_render_pass({.color = colors, .depth_stencil = depth, .name = "hostile"});
     if (at.compute) list.set_pipeline(at.compute);
     else list.set_pipeline(at.graphics);
     for (const auto& [set, of_set] : entries) {
-        NACRE_TRY(const BindGroupLayout layout, at.compute ? device.bind_group_layout(at.compute, set) : device.bind_group_layout(at.graphics, set));
-        NACRE_TRY(const BindGroup group, device.create_bind_group({.layout = layout, .entries = of_set, .name = "hostile"}));
+        NACRE_TRY(const BindGroupLayout layout,
+                  at.compute ? device.bind_group_layout(at.compute, set) : device.bind_group_layout(at.graphics, set));
+        NACRE_TRY(const BindGroup group,
+                  device.create_bind_group({.layout = layout, .entries = of_set, .name = "hostile"}));
         at.groups.push_back(group);
         list.set_bind_group(set, group);
     }
@@ -372,7 +412,8 @@ Expected<void> ModuleRunner::try_run(const std::vector<std::uint32_t>& words, Sh
         list.set_push_constants(std::span<const std::byte>(bytes));
     }
     if (at.compute) {
-        list.dispatch({.x = static_cast<std::uint32_t>(random.between(1, 3)), .y = static_cast<std::uint32_t>(random.between(1, 2))});
+        list.dispatch({.x = static_cast<std::uint32_t>(random.between(1, 3)),
+                       .y = static_cast<std::uint32_t>(random.between(1, 2))});
     } else {
         if (stage == ShaderStage::vertex) list.set_vertex_buffer(0, at.arena, first_region);
         list.draw({.vertex_count = stage == ShaderStage::vertex ? 33u : 3u, .instance_count = 2});

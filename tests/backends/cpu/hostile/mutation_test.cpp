@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Valid modules that nobody would write, compiled and run: none may crash, write outside of what is bound, or leave a device that
-// does not work.
+// Valid modules that nobody would write, compiled and run: none may crash, write outside of what is bound, or leave a
+// device that does not work.
 //
 //     cpu_mutation_test                                            as many modules as a short test has time for
 //     cpu_mutation_test --seed=1000 --count=100000 --chains --folder=found
@@ -43,12 +43,14 @@ struct Settings {
     std::uint64_t count = 150;
     std::string folder;  ///< Where modules go that break something; empty: the test's temporary folder.
     bool in_process = false;
-    bool chains = false;  ///< Modules are made one out of another, which is quicker; what a number gives depends on those before.
+    bool chains =
+        false;  ///< Modules are made one out of another, which is quicker; what a number gives depends on those before.
 } settings;
 
 constexpr int most_seconds = 60;  ///< For one module.
-constexpr std::array<const char*, 5> specs{"cpu:fast:lanes=4:threads=1", "cpu:consistent:lanes=8:threads=1", "cpu:fast:lanes=16:threads=2",
-                                           "cpu:double:threads=1", "cpu:consistent:lanes=4:threads=1"};
+constexpr std::array<const char*, 5> specs{"cpu:fast:lanes=4:threads=1", "cpu:consistent:lanes=8:threads=1",
+                                           "cpu:fast:lanes=16:threads=2", "cpu:double:threads=1",
+                                           "cpu:consistent:lanes=4:threads=1"};
 
 /// What a process that runs modules tells the one that started it; lies in memory of both.
 struct Progress {
@@ -60,7 +62,8 @@ struct Progress {
     bool ended = false;
 };
 
-/// Makes modules of the seeds by changes that leave them valid: each from a seed, or one out of another until it starts again.
+/// Makes modules of the seeds by changes that leave them valid: each from a seed, or one out of another until it starts
+/// again.
 class ModuleSource {
   public:
     explicit ModuleSource(std::vector<SeedShader> seeds) : seeds_(std::move(seeds)), latest_(seeds_) {}
@@ -81,7 +84,8 @@ class ModuleSource {
         }
         const auto which = static_cast<std::size_t>(random.below(static_cast<int>(seeds_.size())));
         last_ = which;
-        if (!settings.chains || random.chance(15) || latest_[which].words.size() > 3 * seeds_[which].words.size()) latest_[which] = seeds_[which];
+        if (!settings.chains || random.chance(15) || latest_[which].words.size() > 3 * seeds_[which].words.size())
+            latest_[which] = seeds_[which];
         return change(latest_[which], random, progress);
     }
 
@@ -110,7 +114,8 @@ class ModuleSource {
 };
 
 void write_words(const std::string& path, const Words& words) {
-    std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(words.data()), static_cast<std::streamsize>(words.size() * 4));
+    std::ofstream(path, std::ios::binary)
+        .write(reinterpret_cast<const char*>(words.data()), static_cast<std::streamsize>(words.size() * 4));
 }
 
 /// Runs modules up to the end, or to the first that breaks something.
@@ -149,7 +154,8 @@ void work(std::uint64_t end, Progress& progress) {
             case Outcome::lost: ++progress.lost, source.start_again(); break;
             case Outcome::broken: {
                 ++progress.broken;
-                std::snprintf(progress.reason, sizeof(progress.reason), "%s of %s: %s", specs[which], module.name.c_str(), runners[which]->reason().c_str());
+                std::snprintf(progress.reason, sizeof(progress.reason), "%s of %s: %s", specs[which],
+                              module.name.c_str(), runners[which]->reason().c_str());
                 return;
             }
         }
@@ -158,10 +164,14 @@ void work(std::uint64_t end, Progress& progress) {
 }
 
 std::string tally(const Progress& progress) {
-    return fmt::format("{} ran, {} refused, {} stopped by the watchdog, {} broke something; {:.0f} % of {} changes left a valid module, {} bytes on average",
-                       progress.ran, progress.refused, progress.lost, progress.broken,
-                       100.0 * static_cast<double>(progress.valid) / static_cast<double>(std::max<std::uint64_t>(progress.tried, 1)), progress.tried,
-                       progress.module_bytes / std::max<std::uint64_t>(progress.ran + progress.refused + progress.lost + progress.broken, 1));
+    return fmt::format(
+        "{} ran, {} refused, {} stopped by the watchdog, {} broke something; {:.0f} % of {} changes left a valid "
+        "module, {} bytes on average",
+        progress.ran, progress.refused, progress.lost, progress.broken,
+        100.0 * static_cast<double>(progress.valid) / static_cast<double>(std::max<std::uint64_t>(progress.tried, 1)),
+        progress.tried,
+        progress.module_bytes /
+            std::max<std::uint64_t>(progress.ran + progress.refused + progress.lost + progress.broken, 1));
 }
 
 TEST(CpuMutations, ValidModulesRunAndLeaveTheDeviceSound) {
@@ -204,14 +214,15 @@ TEST(CpuMutations, ValidModulesRunAndLeaveTheDeviceSound) {
             }
         }
         if (progress.ended) break;
-        const std::string how = hangs                                 ? "hang"
-                                : WIFSIGNALED(status)                 ? fmt::format("signal {}", WTERMSIG(status))
-                                : WEXITSTATUS(status) != 0            ? fmt::format("exit status {}", WEXITSTATUS(status))
-                                                                      : progress.reason;
+        const std::string how = hangs                      ? "hang"
+                                : WIFSIGNALED(status)      ? fmt::format("signal {}", WTERMSIG(status))
+                                : WEXITSTATUS(status) != 0 ? fmt::format("exit status {}", WEXITSTATUS(status))
+                                                           : progress.reason;
         failures.push_back(fmt::format("module {}: {}", progress.next, how));
         std::cout << failures.back() << std::endl;
         std::error_code ignored;
-        std::filesystem::rename(settings.folder + "/current.spv", fmt::format("{}/{}.spv", settings.folder, progress.next), ignored);
+        std::filesystem::rename(settings.folder + "/current.spv",
+                                fmt::format("{}/{}.spv", settings.folder, progress.next), ignored);
         ++progress.next;
     }
     std::cout << tally(progress) << std::endl;
@@ -232,13 +243,16 @@ int run_file(const std::string& path) {
     if (rhi::spirv::check_structure(words, path))
         for (const auto& at : rhi::spirv::instructions(words))
             if (static_cast<spv::Op>(at.opcode()) == spv::Op::OpEntryPoint)
-                stage = at.operand(0) == 0 ? rhi::ShaderStage::vertex : at.operand(0) == 4 ? rhi::ShaderStage::fragment : rhi::ShaderStage::compute;
+                stage = at.operand(0) == 0   ? rhi::ShaderStage::vertex
+                        : at.operand(0) == 4 ? rhi::ShaderStage::fragment
+                                             : rhi::ShaderStage::compute;
     for (const char* spec : specs) {
         auto runner = ModuleRunner::create(spec);
         if (!runner) return 1;
         constexpr std::array<const char*, 4> names{"ran", "refused", "lost", "broken"};
         const Outcome outcome = (*runner)->run(words, stage, 1);
-        std::cout << spec << ": " << names[static_cast<std::size_t>(outcome)] << " " << (*runner)->reason() << std::endl;
+        std::cout << spec << ": " << names[static_cast<std::size_t>(outcome)] << " " << (*runner)->reason()
+                  << std::endl;
     }
     return 0;
 }

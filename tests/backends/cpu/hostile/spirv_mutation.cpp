@@ -22,7 +22,11 @@ bool ends_block(Op op) {
 /// Shapes a function or a block: neither copied nor moved.
 bool is_structural(Op op) {
     switch (op) {
-        case Op::OpFunction: case Op::OpFunctionParameter: case Op::OpFunctionEnd: case Op::OpLabel: case Op::OpSelectionMerge:
+        case Op::OpFunction:
+        case Op::OpFunctionParameter:
+        case Op::OpFunctionEnd:
+        case Op::OpLabel:
+        case Op::OpSelectionMerge:
         case Op::OpLoopMerge: case Op::OpPhi: case Op::OpVariable: case Op::OpLine: case Op::OpNoLine:
             return true;
         default: return ends_block(op);
@@ -30,7 +34,8 @@ bool is_structural(Op op) {
 }
 
 bool is_id(spv_operand_type_t kind) {
-    return kind == SPV_OPERAND_TYPE_ID || kind == SPV_OPERAND_TYPE_MEMORY_SEMANTICS_ID || kind == SPV_OPERAND_TYPE_SCOPE_ID;
+    return kind == SPV_OPERAND_TYPE_ID || kind == SPV_OPERAND_TYPE_MEMORY_SEMANTICS_ID ||
+           kind == SPV_OPERAND_TYPE_SCOPE_ID;
 }
 
 bool is_constant(Op op) {
@@ -40,20 +45,25 @@ bool is_constant(Op op) {
 /// Instructions of each row have the same kinds of operands and results.
 const std::vector<std::vector<Op>>& equal_signatures() {
     static const std::vector<std::vector<Op>> rows{
-        {Op::OpIAdd, Op::OpISub, Op::OpIMul, Op::OpUDiv, Op::OpSDiv, Op::OpUMod, Op::OpSRem, Op::OpSMod, Op::OpShiftRightLogical,
-         Op::OpShiftRightArithmetic, Op::OpShiftLeftLogical, Op::OpBitwiseOr, Op::OpBitwiseXor, Op::OpBitwiseAnd},
+        {Op::OpIAdd, Op::OpISub, Op::OpIMul, Op::OpUDiv, Op::OpSDiv, Op::OpUMod, Op::OpSRem, Op::OpSMod,
+         Op::OpShiftRightLogical, Op::OpShiftRightArithmetic, Op::OpShiftLeftLogical, Op::OpBitwiseOr, Op::OpBitwiseXor,
+         Op::OpBitwiseAnd},
         {Op::OpFAdd, Op::OpFSub, Op::OpFMul, Op::OpFDiv, Op::OpFRem, Op::OpFMod},
-        {Op::OpIEqual, Op::OpINotEqual, Op::OpUGreaterThan, Op::OpSGreaterThan, Op::OpUGreaterThanEqual, Op::OpSGreaterThanEqual,
-         Op::OpULessThan, Op::OpSLessThan, Op::OpULessThanEqual, Op::OpSLessThanEqual},
-        {Op::OpFOrdEqual, Op::OpFUnordEqual, Op::OpFOrdNotEqual, Op::OpFUnordNotEqual, Op::OpFOrdLessThan, Op::OpFUnordLessThan,
-         Op::OpFOrdGreaterThan, Op::OpFUnordGreaterThan, Op::OpFOrdLessThanEqual, Op::OpFUnordLessThanEqual,
-         Op::OpFOrdGreaterThanEqual, Op::OpFUnordGreaterThanEqual},
+        {Op::OpIEqual, Op::OpINotEqual, Op::OpUGreaterThan, Op::OpSGreaterThan, Op::OpUGreaterThanEqual,
+         Op::OpSGreaterThanEqual, Op::OpULessThan, Op::OpSLessThan, Op::OpULessThanEqual, Op::OpSLessThanEqual},
+        {Op::OpFOrdEqual, Op::OpFUnordEqual, Op::OpFOrdNotEqual, Op::OpFUnordNotEqual, Op::OpFOrdLessThan,
+         Op::OpFUnordLessThan, Op::OpFOrdGreaterThan, Op::OpFUnordGreaterThan, Op::OpFOrdLessThanEqual,
+         Op::OpFUnordLessThanEqual, Op::OpFOrdGreaterThanEqual, Op::OpFUnordGreaterThanEqual},
         {Op::OpLogicalEqual, Op::OpLogicalNotEqual, Op::OpLogicalOr, Op::OpLogicalAnd},
         {Op::OpSNegate, Op::OpNot, Op::OpBitReverse, Op::OpCopyObject},
-        {Op::OpFNegate, Op::OpCopyObject, Op::OpDPdx, Op::OpDPdy, Op::OpFwidth, Op::OpDPdxFine, Op::OpDPdyFine, Op::OpFwidthFine,
-         Op::OpDPdxCoarse, Op::OpDPdyCoarse, Op::OpFwidthCoarse},
-        {Op::OpConvertFToU, Op::OpConvertFToS}, {Op::OpConvertSToF, Op::OpConvertUToF}, {Op::OpUConvert, Op::OpSConvert},
-        {Op::OpIsNan, Op::OpIsInf}, {Op::OpAny, Op::OpAll}, {Op::OpLogicalNot, Op::OpCopyObject},
+        {Op::OpFNegate, Op::OpCopyObject, Op::OpDPdx, Op::OpDPdy, Op::OpFwidth, Op::OpDPdxFine, Op::OpDPdyFine,
+         Op::OpFwidthFine, Op::OpDPdxCoarse, Op::OpDPdyCoarse, Op::OpFwidthCoarse},
+        {Op::OpConvertFToU, Op::OpConvertFToS},
+        {Op::OpConvertSToF, Op::OpConvertUToF},
+        {Op::OpUConvert, Op::OpSConvert},
+        {Op::OpIsNan, Op::OpIsInf},
+        {Op::OpAny, Op::OpAll},
+        {Op::OpLogicalNot, Op::OpCopyObject},
         {Op::OpBitFieldSExtract, Op::OpBitFieldUExtract},
         {Op::OpAtomicExchange, Op::OpAtomicIAdd, Op::OpAtomicISub, Op::OpAtomicSMin, Op::OpAtomicUMin, Op::OpAtomicSMax,
          Op::OpAtomicUMax, Op::OpAtomicAnd, Op::OpAtomicOr, Op::OpAtomicXor},
@@ -62,19 +72,21 @@ const std::vector<std::vector<Op>>& equal_signatures() {
         {Op::OpGroupNonUniformShuffle, Op::OpGroupNonUniformShuffleXor, Op::OpGroupNonUniformShuffleUp,
          Op::OpGroupNonUniformShuffleDown, Op::OpGroupNonUniformBroadcast, Op::OpGroupNonUniformQuadBroadcast},
         {Op::OpGroupNonUniformIAdd, Op::OpGroupNonUniformIMul, Op::OpGroupNonUniformSMin, Op::OpGroupNonUniformUMin,
-         Op::OpGroupNonUniformSMax, Op::OpGroupNonUniformUMax, Op::OpGroupNonUniformBitwiseAnd, Op::OpGroupNonUniformBitwiseOr,
-         Op::OpGroupNonUniformBitwiseXor},
+         Op::OpGroupNonUniformSMax, Op::OpGroupNonUniformUMax, Op::OpGroupNonUniformBitwiseAnd,
+         Op::OpGroupNonUniformBitwiseOr, Op::OpGroupNonUniformBitwiseXor},
         {Op::OpGroupNonUniformFAdd, Op::OpGroupNonUniformFMul, Op::OpGroupNonUniformFMin, Op::OpGroupNonUniformFMax},
         {Op::OpReturn, Op::OpKill, Op::OpUnreachable, Op::OpTerminateInvocation},
         {Op::OpAccessChain, Op::OpInBoundsAccessChain},
-        {Op::OpVectorTimesMatrix, Op::OpMatrixTimesVector}, {Op::OpMatrixTimesScalar, Op::OpVectorTimesScalar},
+        {Op::OpVectorTimesMatrix, Op::OpMatrixTimesVector},
+        {Op::OpMatrixTimesScalar, Op::OpVectorTimesScalar},
         {Op::OpImageSampleImplicitLod, Op::OpImageSampleExplicitLod, Op::OpImageSampleProjImplicitLod},
     };
     return rows;
 }
 
 /// Instructions of GLSL.std.450 by what they take: float, two, three; integer, two, three.
-constexpr std::array<std::uint32_t, 25> unary_float{1, 2, 3, 4, 6, 8, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 27, 28, 29, 30, 31, 32, 69};
+constexpr std::array<std::uint32_t, 25> unary_float{1,  2,  3,  4,  6,  8,  10, 11, 12, 13, 14, 15, 16,
+                                                    17, 18, 19, 20, 21, 27, 28, 29, 30, 31, 32, 69};
 constexpr std::array<std::uint32_t, 11> binary_float{25, 26, 37, 40, 48, 71, 79, 80, 25, 26, 48};
 constexpr std::array<std::uint32_t, 7> ternary_float{43, 46, 49, 50, 70, 81, 46};
 constexpr std::array<std::uint32_t, 5> unary_integer{5, 7, 73, 74, 75};
@@ -103,7 +115,8 @@ std::optional<MutableModule> MutableModule::parse(std::span<const std::uint32_t>
     MutableModule module;
     std::copy_n(words.begin(), 5, module.header_.begin());
     module.bound_ = words[3];
-    if (spvBinaryParse(context, &module, words.data(), words.size(), nullptr, &MutableModule::add_parsed, nullptr) != SPV_SUCCESS ||
+    if (spvBinaryParse(context, &module, words.data(), words.size(), nullptr, &MutableModule::add_parsed, nullptr) !=
+            SPV_SUCCESS ||
         module.instructions_.empty())
         return std::nullopt;
     module.find_places();
@@ -115,10 +128,12 @@ void MutableModule::find_places() {
     for (std::size_t i = 0; i < instructions_.size(); ++i) {
         const Instruction& at = instructions_[i];
         if (at.result) definitions_.emplace(at.result, i);
-        const bool is_global = (at.op >= Op::OpTypeVoid && at.op <= Op::OpTypeForwardPointer) || is_constant(at.op) || at.op == Op::OpVariable;
+        const bool is_global = (at.op >= Op::OpTypeVoid && at.op <= Op::OpTypeForwardPointer) || is_constant(at.op) ||
+                               at.op == Op::OpVariable;
         if (is_global) first_type_ = std::min(first_type_, i);
         if (at.op == Op::OpFunction) first_function_ = std::min(first_function_, i);
-        if (at.op == Op::OpExtInstImport && at.words.size() > 4 && at.words[2] == 0x4c534c47) glsl_set_ = at.result;  // "GLSL"
+        if (at.op == Op::OpExtInstImport && at.words.size() > 4 && at.words[2] == 0x4c534c47)
+            glsl_set_ = at.result;  // "GLSL"
     }
     first_type_ = std::min(first_type_, first_function_);
 }
@@ -147,7 +162,10 @@ void mutate_words(Words& words, Random& random) {
     }
     const auto place = [&] { return 5 + static_cast<std::size_t>(random.below(static_cast<int>(words.size() - 5))); };
     switch (random.below(6)) {
-        case 0: words[place()] = static_cast<std::uint32_t>(random.below(static_cast<int>(std::clamp(words[3], 1u, 1u << 20)))); break;
+        case 0:
+            words[place()] =
+                static_cast<std::uint32_t>(random.below(static_cast<int>(std::clamp(words[3], 1u, 1u << 20))));
+            break;
         case 1: words[place()] ^= 1u << random.below(32); break;
         case 2: words[place()] = words[place()] + static_cast<std::uint32_t>(random.between(-2, 2)); break;
         case 3: words[1] = 0x10000 + 0x100 * static_cast<std::uint32_t>(random.below(7)); break;
@@ -178,10 +196,15 @@ bool MutableModule::is_plain(Id id, int depth) const {
     const Instruction* found = type(id);
     if (!found || depth > 16) return false;
     switch (found->op) {
-        case Op::OpTypeBool: case Op::OpTypeInt: case Op::OpTypeFloat: case Op::OpTypeVector: case Op::OpTypeMatrix: return true;
+        case Op::OpTypeBool:
+        case Op::OpTypeInt:
+        case Op::OpTypeFloat:
+        case Op::OpTypeVector:
+        case Op::OpTypeMatrix: return true;
         case Op::OpTypeArray: return is_plain(found->words[2], depth + 1);
         case Op::OpTypeStruct:
-            return std::all_of(found->words.begin() + 2, found->words.end(), [&](Id member) { return is_plain(member, depth + 1); });
+            return std::all_of(found->words.begin() + 2, found->words.end(),
+                               [&](Id member) { return is_plain(member, depth + 1); });
         default: return false;
     }
 }
@@ -203,11 +226,14 @@ std::size_t MutableModule::terminator_behind(std::size_t position) const {
 
 std::pair<std::size_t, std::size_t> MutableModule::insertion_range(std::size_t label) const {
     std::size_t first = label + 1;
-    while (first + 1 < instructions_.size() && (instructions_[first].op == Op::OpPhi || instructions_[first].op == Op::OpVariable ||
-                                                instructions_[first].op == Op::OpLine || instructions_[first].op == Op::OpNoLine))
+    while (first + 1 < instructions_.size() &&
+           (instructions_[first].op == Op::OpPhi || instructions_[first].op == Op::OpVariable ||
+            instructions_[first].op == Op::OpLine || instructions_[first].op == Op::OpNoLine))
         ++first;
     std::size_t last = terminator_behind(label);
-    if (last > first && (instructions_[last - 1].op == Op::OpSelectionMerge || instructions_[last - 1].op == Op::OpLoopMerge)) --last;
+    if (last > first &&
+        (instructions_[last - 1].op == Op::OpSelectionMerge || instructions_[last - 1].op == Op::OpLoopMerge))
+        --last;
     return {std::min(first, last), last};
 }
 
@@ -215,10 +241,12 @@ Id MutableModule::find_value(Id of_type, std::size_t before, Id other_than) {
     if (!of_type) return 0;
     std::vector<Id> local, global;
     for (std::size_t i = function_begin(before); i < before; ++i)
-        if (instructions_[i].type == of_type && instructions_[i].op != Op::OpFunction && instructions_[i].result != other_than)
+        if (instructions_[i].type == of_type && instructions_[i].op != Op::OpFunction &&
+            instructions_[i].result != other_than)
             local.push_back(instructions_[i].result);
     for (std::size_t i = first_type_; i < first_function_; ++i)
-        if (instructions_[i].type == of_type && instructions_[i].result != other_than) global.push_back(instructions_[i].result);
+        if (instructions_[i].type == of_type && instructions_[i].result != other_than)
+            global.push_back(instructions_[i].result);
     if (!local.empty() && (global.empty() || random_->chance(75))) return random_->pick(local);
     return global.empty() ? 0 : random_->pick(global);
 }
@@ -253,7 +281,8 @@ std::optional<std::size_t> MutableModule::find_block(bool may_be_loop_header) {
 
 Id MutableModule::find_type(Op op, std::initializer_list<std::uint32_t> operands) {
     const auto is_equal = [&](const Instruction& at) {
-        return at.op == op && at.words.size() == operands.size() + 2 && std::equal(operands.begin(), operands.end(), at.words.begin() + 2);
+        return at.op == op && at.words.size() == operands.size() + 2 &&
+               std::equal(operands.begin(), operands.end(), at.words.begin() + 2);
     };
     for (std::size_t i = first_type_; i < first_function_; ++i)
         if (is_equal(instructions_[i])) return instructions_[i].result;
@@ -297,8 +326,10 @@ std::uint32_t MutableModule::interesting_word() {
     if (random_->chance(25)) return static_cast<std::uint32_t>(random_->below(70));
     if (random_->chance(15)) return 1u << random_->below(32);
     if (random_->chance(10)) return static_cast<std::uint32_t>(random_->next());
-    return random_->pick({0u, 1u, 2u, 3u, 31u, 32u, 33u, 63u, 64u, 255u, 65535u, ~0u, ~1u, 0x80000000u, 0x7fffffffu, 0x7f800000u, 0xff800000u,
-                          0x7fc00000u, 0x3f800000u, 0xbf800000u, 0x4f000000u, 1u << 20, 1u << 30});
+    return random_->pick({0u,          1u,          2u,          3u,          31u,         32u,
+                          33u,         63u,         64u,         255u,        65535u,      ~0u,
+                          ~1u,         0x80000000u, 0x7fffffffu, 0x7f800000u, 0xff800000u, 0x7fc00000u,
+                          0x3f800000u, 0xbf800000u, 0x4f000000u, 1u << 20,    1u << 30});
 }
 
 Id MutableModule::interesting_constant(Id of_type) {
@@ -337,13 +368,16 @@ Id MutableModule::index_value(std::size_t before, std::uint32_t count) {
         if (const Id found = find_value(is_scalar_integer, before)) return found;
     Id word = find_type(Op::OpTypeInt, {32u, 0u});
     if (!word) word = type_like(Op::OpTypeInt, {32u, 1u});
-    if (random_->chance(50)) return constant(word, static_cast<std::uint32_t>(random_->below(static_cast<int>(std::clamp(count, 1u, 1u << 20)))));
-    return constant(word, random_->pick({count, count + 1, ~0u, 0x80000000u, 0x7fffffffu, 1u << 28, 1u << 16, 0xfffffff0u}));
+    if (random_->chance(50))
+        return constant(word,
+                        static_cast<std::uint32_t>(random_->below(static_cast<int>(std::clamp(count, 1u, 1u << 20)))));
+    return constant(word,
+                    random_->pick({count, count + 1, ~0u, 0x80000000u, 0x7fffffffu, 1u << 28, 1u << 16, 0xfffffff0u}));
 }
 
 void MutableModule::insert(std::size_t before, std::vector<Instruction> made) {
-    instructions_.insert(instructions_.begin() + static_cast<std::ptrdiff_t>(before), std::make_move_iterator(made.begin()),
-                         std::make_move_iterator(made.end()));
+    instructions_.insert(instructions_.begin() + static_cast<std::ptrdiff_t>(before),
+                         std::make_move_iterator(made.begin()), std::make_move_iterator(made.end()));
 }
 
 void MutableModule::use_later(Id value, std::size_t from) {
@@ -364,14 +398,16 @@ void MutableModule::use_later(Id value, std::size_t from) {
     if (!places.empty()) *random_->pick(places) = value;
 }
 
-std::vector<MutableModule::Instruction> MutableModule::cloned(std::size_t first, std::size_t end, std::unordered_map<Id, Id>& renamed) {
+std::vector<MutableModule::Instruction> MutableModule::cloned(std::size_t first, std::size_t end,
+                                                              std::unordered_map<Id, Id>& renamed) {
     std::vector<Instruction> made;
     for (std::size_t i = first; i < end; ++i) {
         if (is_structural(instructions_[i].op)) continue;
         Instruction copy = instructions_[i];
         for (const Operand& operand : copy.operands)
             if (is_id(operand.kind))
-                if (const auto found = renamed.find(copy.words[operand.first]); found != renamed.end()) copy.words[operand.first] = found->second;
+                if (const auto found = renamed.find(copy.words[operand.first]); found != renamed.end())
+                    copy.words[operand.first] = found->second;
         if (copy.result) {
             const Id result = fresh();
             renamed[copy.result] = result;
@@ -384,7 +420,8 @@ std::vector<MutableModule::Instruction> MutableModule::cloned(std::size_t first,
 }
 
 void MutableModule::rename_predecessor(Id from, Id to, std::size_t within) {
-    for (std::size_t i = function_begin(within); i < instructions_.size() && instructions_[i].op != Op::OpFunctionEnd; ++i)
+    for (std::size_t i = function_begin(within); i < instructions_.size() && instructions_[i].op != Op::OpFunctionEnd;
+         ++i)
         if (instructions_[i].op == Op::OpPhi)
             for (std::size_t word = 4; word < instructions_[i].words.size(); word += 2)
                 if (instructions_[i].words[word] == from) instructions_[i].words[word] = to;
@@ -393,7 +430,9 @@ void MutableModule::rename_predecessor(Id from, Id to, std::size_t within) {
 // ---- Changes
 
 bool MutableModule::replace_operand() {
-    const auto position = find_instruction([](const Instruction& at) { return at.op != Op::OpLabel && at.op != Op::OpFunction && at.operands.size() > 0; });
+    const auto position = find_instruction([](const Instruction& at) {
+        return at.op != Op::OpLabel && at.op != Op::OpFunction && at.operands.size() > 0;
+    });
     if (!position) return false;
     Instruction& at = instructions_[*position];
     std::vector<std::size_t> places;
@@ -434,7 +473,8 @@ bool MutableModule::change_array_length() {
     // The constant must come before the type.
     std::vector<Id> lengths;
     for (std::size_t i = first_type_; i < definitions_[at.result]; ++i)
-        if (instructions_[i].op == Op::OpConstant && type(instructions_[i].type)->op == Op::OpTypeInt) lengths.push_back(instructions_[i].result);
+        if (instructions_[i].op == Op::OpConstant && type(instructions_[i].type)->op == Op::OpTypeInt)
+            lengths.push_back(instructions_[i].result);
     if (lengths.empty()) return false;
     at.words[3] = random_->pick(lengths);
     return true;
@@ -454,10 +494,13 @@ bool MutableModule::change_opcode() {
 }
 
 bool MutableModule::change_extended() {
-    const auto position = find_instruction([&](const Instruction& at) { return at.op == Op::OpExtInst && at.words[3] == glsl_set_; });
+    const auto position =
+        find_instruction([&](const Instruction& at) { return at.op == Op::OpExtInst && at.words[3] == glsl_set_; });
     if (!position) return false;
     Instruction& at = instructions_[*position];
-    const auto any_of = [&](const auto& numbers) { return numbers[static_cast<std::size_t>(random_->below(static_cast<int>(numbers.size())))]; };
+    const auto any_of = [&](const auto& numbers) {
+        return numbers[static_cast<std::size_t>(random_->below(static_cast<int>(numbers.size())))];
+    };
     const bool is_float = is_floating(at.type);
     switch (at.words.size()) {
         case 6: at.words[4] = is_float ? any_of(unary_float) : any_of(unary_integer); break;
@@ -473,12 +516,16 @@ bool MutableModule::change_literal() {
     std::vector<std::uint32_t*> places;
     // Of all literals and flags; those of functions more often than others.
     const bool in_functions = random_->chance(60);
-    for (std::size_t i = in_functions ? first_function_ : 0; i < (in_functions ? instructions_.size() : first_function_); ++i) {
+    for (std::size_t i = in_functions ? first_function_ : 0;
+         i < (in_functions ? instructions_.size() : first_function_); ++i) {
         Instruction& at = instructions_[i];
-        if (at.op == Op::OpCapability || at.op == Op::OpConstant || at.op == Op::OpMemoryModel || at.op == Op::OpSource || at.op == Op::OpLine) continue;
+        if (at.op == Op::OpCapability || at.op == Op::OpConstant || at.op == Op::OpMemoryModel ||
+            at.op == Op::OpSource || at.op == Op::OpLine)
+            continue;
         for (const Operand& operand : at.operands) {
-            if (is_id(operand.kind) || operand.kind == SPV_OPERAND_TYPE_TYPE_ID || operand.kind == SPV_OPERAND_TYPE_RESULT_ID ||
-                operand.kind == SPV_OPERAND_TYPE_LITERAL_STRING || operand.kind == SPV_OPERAND_TYPE_EXTENSION_INSTRUCTION_NUMBER)
+            if (is_id(operand.kind) || operand.kind == SPV_OPERAND_TYPE_TYPE_ID ||
+                operand.kind == SPV_OPERAND_TYPE_RESULT_ID || operand.kind == SPV_OPERAND_TYPE_LITERAL_STRING ||
+                operand.kind == SPV_OPERAND_TYPE_EXTENSION_INSTRUCTION_NUMBER)
                 continue;
             places.push_back(&at.words[operand.first]);
             chosen = &at;
@@ -497,8 +544,8 @@ bool MutableModule::change_literal() {
 
 bool MutableModule::change_index() {
     const auto is_chain = [](const Instruction& at) {
-        return ((at.op == Op::OpAccessChain || at.op == Op::OpInBoundsAccessChain) && at.words.size() > 4) || at.op == Op::OpVectorExtractDynamic ||
-               at.op == Op::OpVectorInsertDynamic;
+        return ((at.op == Op::OpAccessChain || at.op == Op::OpInBoundsAccessChain) && at.words.size() > 4) ||
+               at.op == Op::OpVectorExtractDynamic || at.op == Op::OpVectorInsertDynamic;
     };
     const auto position = find_instruction(is_chain);
     if (!position) return false;
@@ -530,8 +577,14 @@ bool MutableModule::change_terminator() {
         switch (random_->below(4)) {
             case 0: at.words.insert(at.words.end(), {interesting_word(), random_->pick(labels)}); break;
             case 1: at.words.insert(at.words.end(), {interesting_word(), at.words[2]}); break;
-            case 2: at.words[3 + 2 * static_cast<std::size_t>(random_->below(static_cast<int>(cases)))] = interesting_word(); break;
-            default: std::swap(at.words[2], at.words[4 + 2 * static_cast<std::size_t>(random_->below(static_cast<int>(cases)))]); break;
+            case 2:
+                at.words[3 + 2 * static_cast<std::size_t>(random_->below(static_cast<int>(cases)))] =
+                    interesting_word();
+                break;
+            default:
+                std::swap(at.words[2],
+                          at.words[4 + 2 * static_cast<std::size_t>(random_->below(static_cast<int>(cases)))]);
+                break;
         }
         return true;
     }
@@ -585,7 +638,8 @@ bool MutableModule::duplicate_instruction() {
 
 bool MutableModule::swap_instructions() {
     const auto position = find_instruction([](const Instruction& at) { return !is_structural(at.op); });
-    if (!position || *position + 1 >= instructions_.size() || is_structural(instructions_[*position + 1].op)) return false;
+    if (!position || *position + 1 >= instructions_.size() || is_structural(instructions_[*position + 1].op))
+        return false;
     std::swap(instructions_[*position], instructions_[*position + 1]);
     return true;
 }
@@ -597,7 +651,8 @@ bool MutableModule::insert_operation() {
     const std::size_t at = first + static_cast<std::size_t>(random_->below(static_cast<int>(last - first + 1)));
     const auto is_value = [&](Id id) {
         const Op op = type(id)->op;
-        return op == Op::OpTypeInt || op == Op::OpTypeFloat || op == Op::OpTypeBool || op == Op::OpTypeVector || op == Op::OpTypeMatrix;
+        return op == Op::OpTypeInt || op == Op::OpTypeFloat || op == Op::OpTypeBool || op == Op::OpTypeVector ||
+               op == Op::OpTypeMatrix;
     };
     const Id a = find_value(is_value, at);
     if (!a) return false;
@@ -616,26 +671,42 @@ bool MutableModule::insert_operation() {
         return made.back().result;
     };
     if (glsl_set_ && random_->chance(20) && (is_integer(of_type) || is_floating(of_type))) {
-        const auto any_of = [&](const auto& numbers) { return numbers[static_cast<std::size_t>(random_->below(static_cast<int>(numbers.size())))]; };
+        const auto any_of = [&](const auto& numbers) {
+            return numbers[static_cast<std::size_t>(random_->below(static_cast<int>(numbers.size())))];
+        };
         const bool is_float = is_floating(of_type);
         switch (random_->below(3)) {
-            case 0: add(Op::OpExtInst, of_type, {glsl_set_, is_float ? any_of(unary_float) : any_of(unary_integer), a}); break;
-            case 1: add(Op::OpExtInst, of_type, {glsl_set_, is_float ? any_of(binary_float) : any_of(binary_integer), a, other()}); break;
-            default: add(Op::OpExtInst, of_type, {glsl_set_, is_float ? any_of(ternary_float) : any_of(ternary_integer), a, other(), other()}); break;
+            case 0:
+                add(Op::OpExtInst, of_type, {glsl_set_, is_float ? any_of(unary_float) : any_of(unary_integer), a});
+                break;
+            case 1:
+                add(Op::OpExtInst, of_type,
+                    {glsl_set_, is_float ? any_of(binary_float) : any_of(binary_integer), a, other()});
+                break;
+            default:
+                add(Op::OpExtInst, of_type,
+                    {glsl_set_, is_float ? any_of(ternary_float) : any_of(ternary_integer), a, other(), other()});
+                break;
         }
     } else if (is_vector && random_->chance(45)) {
         switch (random_->below(4)) {
             case 0: add(Op::OpVectorExtractDynamic, scalar, {a, index_value(at, components)}); break;
             case 1: {
                 const Id part = find_value(scalar, at);
-                add(Op::OpVectorInsertDynamic, of_type, {a, part ? part : interesting_constant(scalar), index_value(at, components)});
+                add(Op::OpVectorInsertDynamic, of_type,
+                    {a, part ? part : interesting_constant(scalar), index_value(at, components)});
                 break;
             }
-            case 2: add(Op::OpCompositeExtract, scalar, {a, static_cast<std::uint32_t>(random_->below(static_cast<int>(components)))}); break;
+            case 2:
+                add(Op::OpCompositeExtract, scalar,
+                    {a, static_cast<std::uint32_t>(random_->below(static_cast<int>(components)))});
+                break;
             default: {
                 add(Op::OpVectorShuffle, of_type, {a, other()});
                 for (std::uint32_t i = 0; i < components; ++i)
-                    made.back().words.push_back(random_->chance(5) ? ~0u : static_cast<std::uint32_t>(random_->below(static_cast<int>(2 * components))));
+                    made.back().words.push_back(random_->chance(5) ? ~0u
+                                                                   : static_cast<std::uint32_t>(random_->below(
+                                                                         static_cast<int>(2 * components))));
                 break;
             }
         }
@@ -654,7 +725,8 @@ bool MutableModule::insert_operation() {
         } else if (random_->chance(15)) {
             add(random_->pick({Op::OpBitFieldInsert}), of_type, {a, other(), index_value(at, 32), index_value(at, 32)});
         } else if (random_->chance(15)) {
-            add(random_->pick({Op::OpBitFieldSExtract, Op::OpBitFieldUExtract}), of_type, {a, index_value(at, 32), index_value(at, 32)});
+            add(random_->pick({Op::OpBitFieldSExtract, Op::OpBitFieldUExtract}), of_type,
+                {a, index_value(at, 32), index_value(at, 32)});
         } else if (random_->chance(15)) {
             add(random_->pick({Op::OpSNegate, Op::OpNot, Op::OpBitReverse, Op::OpBitCount}), of_type, {a});
         } else {
@@ -695,8 +767,9 @@ bool MutableModule::insert_access() {
         const Instruction* kind = type(id);
         if (kind->op != Op::OpTypePointer) return false;
         const Instruction* pointee = type(kind->words[3]);
-        return pointee && (pointee->op == Op::OpTypeStruct || pointee->op == Op::OpTypeArray || pointee->op == Op::OpTypeRuntimeArray ||
-                           pointee->op == Op::OpTypeVector || pointee->op == Op::OpTypeMatrix);
+        return pointee && (pointee->op == Op::OpTypeStruct || pointee->op == Op::OpTypeArray ||
+                           pointee->op == Op::OpTypeRuntimeArray || pointee->op == Op::OpTypeVector ||
+                           pointee->op == Op::OpTypeMatrix);
     };
     const Id base = find_value(is_pointer, at);
     if (!base) return false;
@@ -712,8 +785,10 @@ bool MutableModule::insert_access() {
             const auto member = static_cast<std::uint32_t>(random_->below(static_cast<int>(kind->words.size() - 2)));
             indices.push_back(constant(type_like(Op::OpTypeInt, {32u, 0u}), member));
             pointee = kind->words[2 + member];
-        } else if (kind->op == Op::OpTypeArray || kind->op == Op::OpTypeRuntimeArray || kind->op == Op::OpTypeVector || kind->op == Op::OpTypeMatrix) {
-            const std::uint32_t count = kind->op == Op::OpTypeVector || kind->op == Op::OpTypeMatrix ? kind->words[3] : 8;
+        } else if (kind->op == Op::OpTypeArray || kind->op == Op::OpTypeRuntimeArray || kind->op == Op::OpTypeVector ||
+                   kind->op == Op::OpTypeMatrix) {
+            const std::uint32_t count =
+                kind->op == Op::OpTypeVector || kind->op == Op::OpTypeMatrix ? kind->words[3] : 8;
             indices.push_back(index_value(at, count));
             pointee = kind->words[2];
         } else {
@@ -744,7 +819,8 @@ bool MutableModule::insert_access() {
         result = fresh();
         made.push_back(make(Op::OpLoad, pointee, result, {place}));
         // What is loaded goes somewhere, so that it is not left out.
-        const Id target = find_value([&](Id id) { return type(id)->op == Op::OpTypePointer && type(id)->words[3] == pointee; }, at);
+        const Id target =
+            find_value([&](Id id) { return type(id)->op == Op::OpTypePointer && type(id)->words[3] == pointee; }, at);
         if (target && random_->chance(50)) made.push_back(make(Op::OpStore, 0, 0, {target, result}));
     }
     const std::size_t count = made.size();
@@ -766,7 +842,8 @@ bool MutableModule::insert_selection() {
         const Id number = find_value([&](Id id) { return type(id)->op == Op::OpTypeInt; }, at);
         if (number) {
             condition = fresh();
-            made.push_back(make(random_->pick(equal_signatures()[2]), boolean, condition, {number, interesting_constant(type_of(number))}));
+            made.push_back(make(random_->pick(equal_signatures()[2]), boolean, condition,
+                                {number, interesting_constant(type_of(number))}));
         }
     }
     if (!condition) condition = interesting_constant(boolean);
@@ -786,8 +863,10 @@ bool MutableModule::insert_selection() {
     if (moves) {
         for (std::size_t i = at; i < end; ++i)
             if (const Id result = instructions_[i].result; result && renamed.contains(result))
-                made.push_back(make(Op::OpPhi, instructions_[i].type, result, {renamed[result], then, null_of(instructions_[i].type), block}));
-        instructions_.erase(instructions_.begin() + static_cast<std::ptrdiff_t>(at), instructions_.begin() + static_cast<std::ptrdiff_t>(end));
+                made.push_back(make(Op::OpPhi, instructions_[i].type, result,
+                                    {renamed[result], then, null_of(instructions_[i].type), block}));
+        instructions_.erase(instructions_.begin() + static_cast<std::ptrdiff_t>(at),
+                            instructions_.begin() + static_cast<std::ptrdiff_t>(end));
     }
     insert(at, std::move(made));
     return true;
@@ -798,7 +877,8 @@ bool MutableModule::insert_switch() {
     if (!label) return false;
     const auto [first, last] = insertion_range(*label);
     const std::size_t at = first + static_cast<std::size_t>(random_->below(static_cast<int>(last - first + 1)));
-    const Id selector = find_value([&](Id id) { return type(id)->op == Op::OpTypeInt && type(id)->words[2] == 32; }, at);
+    const Id selector =
+        find_value([&](Id id) { return type(id)->op == Op::OpTypeInt && type(id)->words[2] == 32; }, at);
     if (!selector) return false;
     const Id behind = fresh(), block = instructions_[*label].result;
     rename_predecessor(block, behind, *label);
@@ -808,7 +888,8 @@ bool MutableModule::insert_switch() {
     Instruction branch = make(Op::OpSwitch, 0, 0, {selector, random_->chance(50) ? behind : random_->pick(cases)});
     for (std::size_t i = 0; i < cases.size(); ++i) {
         branch.words.insert(branch.words.end(), {static_cast<std::uint32_t>(i), cases[i]});
-        if (random_->chance(20)) branch.words.insert(branch.words.end(), {static_cast<std::uint32_t>(i) + 100, cases[i]});
+        if (random_->chance(20))
+            branch.words.insert(branch.words.end(), {static_cast<std::uint32_t>(i) + 100, cases[i]});
     }
     made.push_back(std::move(branch));
     for (std::size_t i = 0; i < cases.size(); ++i) {
@@ -816,7 +897,8 @@ bool MutableModule::insert_switch() {
         std::unordered_map<Id, Id> renamed;
         const std::size_t begin = std::min(last, at + static_cast<std::size_t>(random_->below(6)));
         // What is copied comes before it is made: everything from the place on.
-        std::vector<Instruction> copies = cloned(at, std::min(last, begin + static_cast<std::size_t>(random_->below(4))), renamed);
+        std::vector<Instruction> copies =
+            cloned(at, std::min(last, begin + static_cast<std::size_t>(random_->below(4))), renamed);
         made.insert(made.end(), copies.begin(), copies.end());
         const bool falls_through = i + 1 < cases.size() && random_->chance(50);
         made.push_back(make(Op::OpBranch, 0, 0, {falls_through ? cases[i + 1] : behind}));
@@ -874,10 +956,12 @@ bool MutableModule::insert_loop() {
     made.insert(made.end(), copies.begin(), copies.end());
     if (!condition) {
         condition = fresh();
-        made.push_back(make(random_->pick({Op::OpULessThan, Op::OpSLessThan, Op::OpINotEqual}), boolean, condition, {counter, limit}));
+        made.push_back(make(random_->pick({Op::OpULessThan, Op::OpSLessThan, Op::OpINotEqual}), boolean, condition,
+                            {counter, limit}));
     }
     const bool is_swapped = random_->chance(3);
-    made.push_back(make(Op::OpBranchConditional, 0, 0, {condition, is_swapped ? behind : next, is_swapped ? next : behind}));
+    made.push_back(
+        make(Op::OpBranchConditional, 0, 0, {condition, is_swapped ? behind : next, is_swapped ? next : behind}));
     made.push_back(make(Op::OpLabel, 0, next, {}));
     made.push_back(make(Op::OpIAdd, number, increased, {counter, constant(number, 1)}));
     made.push_back(make(Op::OpBranch, 0, 0, {header}));
@@ -898,10 +982,12 @@ bool MutableModule::insert_jump() {
     const std::size_t begin = function_begin(at);
     std::vector<Id> targets;
     for (std::size_t i = begin; i < at; ++i)
-        if (instructions_[i].op == Op::OpLoopMerge) targets.insert(targets.end(), {instructions_[i].words[1], instructions_[i].words[2]});
+        if (instructions_[i].op == Op::OpLoopMerge)
+            targets.insert(targets.end(), {instructions_[i].words[1], instructions_[i].words[2]});
     const Id leaves = fresh(), behind = fresh(), block = instructions_[*label].result;
     rename_predecessor(block, behind, *label);
-    std::vector<Instruction> made{make(Op::OpSelectionMerge, 0, 0, {behind, 0}), make(Op::OpBranchConditional, 0, 0, {condition, leaves, behind}),
+    std::vector<Instruction> made{make(Op::OpSelectionMerge, 0, 0, {behind, 0}),
+                                  make(Op::OpBranchConditional, 0, 0, {condition, leaves, behind}),
                                   make(Op::OpLabel, 0, leaves, {})};
     if (!targets.empty() && random_->chance(75)) {
         made.push_back(make(Op::OpBranch, 0, 0, {random_->pick(targets)}));
@@ -976,7 +1062,8 @@ bool MutableModule::wrap_in_function() {
 }
 
 bool MutableModule::add_decoration() {
-    const auto position = find_instruction([](const Instruction& at) { return at.result && at.type && at.op != Op::OpFunction; });
+    const auto position =
+        find_instruction([](const Instruction& at) { return at.result && at.type && at.op != Op::OpFunction; });
     if (!position) return false;
     Id target = instructions_[*position].result;
     if (random_->chance(40)) {
@@ -985,9 +1072,11 @@ bool MutableModule::add_decoration() {
             if (instructions_[i].op == Op::OpVariable) variables.push_back(instructions_[i].result);
         if (!variables.empty()) target = random_->pick(variables);
     }
-    // RelaxedPrecision, NoPerspective, Flat, Centroid, Sample, Invariant, Restrict, Aliased, Volatile, Coherent, NonWritable, NonReadable,
-    // NoContraction, NonUniform.
-    annotations_.push_back(make(Op::OpDecorate, 0, 0, {target, random_->pick({0u, 13u, 14u, 16u, 17u, 18u, 19u, 20u, 21u, 23u, 24u, 25u, 42u, 5300u})}));
+    // RelaxedPrecision, NoPerspective, Flat, Centroid, Sample, Invariant, Restrict, Aliased, Volatile, Coherent,
+    // NonWritable, NonReadable, NoContraction, NonUniform.
+    annotations_.push_back(
+        make(Op::OpDecorate, 0, 0,
+             {target, random_->pick({0u, 13u, 14u, 16u, 17u, 18u, 19u, 20u, 21u, 23u, 24u, 25u, 42u, 5300u})}));
     return true;
 }
 
@@ -996,12 +1085,15 @@ bool MutableModule::mutate(Random& random) {
     if (first_function_ >= instructions_.size()) return change_literal();
     using Change = bool (MutableModule::*)();
     static const std::vector<std::pair<int, Change>> changes{
-        {22, &MutableModule::replace_operand}, {5, &MutableModule::change_constant}, {2, &MutableModule::change_array_length},
-        {8, &MutableModule::change_opcode}, {4, &MutableModule::change_extended}, {6, &MutableModule::change_literal},
-        {6, &MutableModule::change_index}, {5, &MutableModule::change_terminator}, {5, &MutableModule::remove_instruction},
-        {4, &MutableModule::duplicate_instruction}, {4, &MutableModule::swap_instructions}, {12, &MutableModule::insert_operation},
-        {10, &MutableModule::insert_access}, {7, &MutableModule::insert_selection}, {4, &MutableModule::insert_switch},
-        {6, &MutableModule::insert_loop}, {5, &MutableModule::insert_jump}, {4, &MutableModule::wrap_in_function},
+        {22, &MutableModule::replace_operand},    {5, &MutableModule::change_constant},
+        {2, &MutableModule::change_array_length}, {8, &MutableModule::change_opcode},
+        {4, &MutableModule::change_extended},     {6, &MutableModule::change_literal},
+        {6, &MutableModule::change_index},        {5, &MutableModule::change_terminator},
+        {5, &MutableModule::remove_instruction},  {4, &MutableModule::duplicate_instruction},
+        {4, &MutableModule::swap_instructions},   {12, &MutableModule::insert_operation},
+        {10, &MutableModule::insert_access},      {7, &MutableModule::insert_selection},
+        {4, &MutableModule::insert_switch},       {6, &MutableModule::insert_loop},
+        {5, &MutableModule::insert_jump},         {4, &MutableModule::wrap_in_function},
         {3, &MutableModule::add_decoration}};
     int total = 0;
     for (const auto& [weight, change] : changes) total += weight;

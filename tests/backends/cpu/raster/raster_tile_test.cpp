@@ -143,7 +143,8 @@ TEST(WholeBlocks, KeepTheirTriangleWhileOthersAreDrawn) {
                     const bool is_pixel = x == 1 && y == 1;
                     if (x < 4 && !is_pixel) continue;
                     const std::uint32_t expected = (x >= 4) == whole_waits ? 1 : others + 1;
-                    ASSERT_EQ(color.at<std::uint32_t>(x, y), expected) << lanes << whole_waits << ": " << x << ", " << y;
+                    ASSERT_EQ(color.at<std::uint32_t>(x, y), expected)
+                        << lanes << whole_waits << ": " << x << ", " << y;
                 }
         }
 }

@@ -267,7 +267,8 @@ TEST_P(RayTraversal, EveryBoxOnTheWayIsACandidateOnce) {
                     }
                     if (std::abs(leaves - enters) < 1e-4) continue;
                     const auto times = std::ranges::count(seen[lane], i);
-                    ASSERT_EQ(times, leaves > enters && !is_broken(i) ? 1 : 0) << "ray " << first + lane << ", box " << i;
+                    ASSERT_EQ(times, leaves > enters && !is_broken(i) ? 1 : 0)
+                        << "ray " << first + lane << ", box " << i;
                 }
             }
         }
