@@ -23,6 +23,10 @@ if(NACRE_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
 endif()
 
 add_compile_options(-Wall -Wextra -Wpedantic -Wshadow -Wno-missing-field-initializers -Winvalid-pch)
+if(NACRE_UNITY_BUILD)
+  # True of files that are compiled by themselves; together they see each other's names.
+  add_compile_options(-Wno-shadow -Wno-subobject-linkage)
+endif()
 if(NACRE_SANITIZER STREQUAL "address")
   add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer -O1)
   add_link_options(-fsanitize=address,undefined)

@@ -956,16 +956,18 @@ ClosureValue evaluate_closure_above(Closure closure, vec3 outside) {
 #endif
 #endif
     value.diffuse = closure.diffuse * diffuse_lobe(closure, light, half_cosine, h.z);
-    float lambert = light.z * inverse_pi;
 #ifdef NACRE_CLOSURE_COVERED
     value.diffuse *= diffuse_scale;
-    lambert *= lambert_scale;
     if (closure.veil > 0.0)
         value.diffuse += closure.scattered * (outside.z * inverse_pi * closure.scattered_scale *
                                               thin_density(outside.z, closure.veil_bend, closure.scattered_way));
 #endif
 #ifdef NACRE_SLAB_MEDIUM
     if ((closure.features & slab_medium) != 0u) {
+        float lambert = light.z * inverse_pi;
+#ifdef NACRE_CLOSURE_COVERED
+        lambert *= lambert_scale;
+#endif
         value.diffuse += closure.thin * (lambert * closure.thin_scale *
                                          thin_density(light.z, closure.bend, closure.thin_way));
         value.subsurface = closure.subsurface * lambert;

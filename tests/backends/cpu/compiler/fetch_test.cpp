@@ -196,7 +196,10 @@ TEST_P(FetchInFragments, GivesTheTexelOfTheDraw) {
         for (std::int32_t point = 0; point < points; ++point) {
             const auto [x, y, layer] = place_of(point);
             list.set_push_constants(std::array{x, y, layer, row - 2});
-            list.set_scissor({.x = point, .y = row, .width = 1, .height = 1});
+            list.set_scissor({.x = static_cast<std::uint32_t>(point),
+                              .y = static_cast<std::uint32_t>(row),
+                              .width = 1,
+                              .height = 1});
             list.draw({.vertex_count = 3});
         }
     list.end_render_pass();
