@@ -56,8 +56,11 @@ TEST_P(Emission, IsTintedByTheLayersAbove) {
     }
     const glm::vec3 seen = shot.radiance_at(16, 16);
     EXPECT_LT(expected.b, 1.0) << "the coat takes blue light";
+    // Plain slabs come with packed targets: half a step of 9 bits below the exponent of the largest channel.
+    const double largest = std::max({expected.r, expected.g, expected.b});
+    const double half_step = is_plain ? std::exp2(std::floor(std::log2(largest)) - 9.0) : 0.0;
     for (int channel = 0; channel < 3; ++channel)
-        EXPECT_NEAR(seen[channel], expected[channel], 0.01 * expected[channel]);
+        EXPECT_NEAR(seen[channel], expected[channel], std::max(0.01 * expected[channel], half_step));
 }
 
 // Faces that coincide give their light once, and hidden ones none.
