@@ -107,7 +107,7 @@ TEST(BuildingBlocks, AnisotropyIsConvertedByWidths) {
         for (const float amount : {0.3f, 0.8f}) {
             const double alpha = double(roughness) * roughness;
             const auto widths = [&](const Tree& tree) {
-                const auto& slab = shaded(tree, 1.0).closures[0].slab;
+                const auto slab = shaded(tree, 1.0).closures[0].slab;
                 EXPECT_NE(slab.features & slab_anisotropy, 0u);
                 return library.ggx_alpha(slab.roughness, slab.anisotropy);
             };
