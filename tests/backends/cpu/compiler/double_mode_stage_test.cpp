@@ -71,13 +71,19 @@ class Picture {
     Texture target_, depth_, many_;
 };
 
-TEST(DoubleMode, ValuesBetweenTheStagesAreInterpolatedInDouble) {
-    Bench bench("cpu:double");
-    Picture picture(bench);
+/// Into the targets of Picture, by depth.
+GraphicsPipelineDesc keeping_the_nearest() {
     GraphicsPipelineDesc desc;
     desc.color_targets = {{.format = Format::rgba32_float}};
     desc.depth_stencil = {
         .format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::less};
+    return desc;
+}
+
+TEST(DoubleMode, ValuesBetweenTheStagesAreInterpolatedInDouble) {
+    Bench bench("cpu:double");
+    Picture picture(bench);
+    const GraphicsPipelineDesc desc = keeping_the_nearest();
     // A triangle that covers all pixels, with a different w at each vertex.
     picture.draw(
         desc,
@@ -118,10 +124,7 @@ TEST(DoubleMode, ValuesBetweenTheStagesAreInterpolatedInDouble) {
 TEST(DoubleMode, WhatIsHiddenLeavesWhatWaitsAsItIs) {
     Bench bench("cpu:double");
     Picture picture(bench);
-    GraphicsPipelineDesc desc;
-    desc.color_targets = {{.format = Format::rgba32_float}};
-    desc.depth_stencil = {
-        .format = Format::d32_float, .depth_test = true, .depth_write = true, .depth_compare = CompareOperation::less};
+    const GraphicsPipelineDesc desc = keeping_the_nearest();
     // The first is near; the others lie behind it, many more than a tile can keep.
     constexpr std::uint32_t triangles = 1000;
     picture.draw(
