@@ -36,7 +36,9 @@ bool ComputeEmitter::emit_stage(const Instruction& at) {
         case Op::OpDPdxFine:
         case Op::OpDPdyFine:
         case Op::OpFwidthFine:
-        case Op::OpDPdxCoarse: case Op::OpDPdyCoarse: case Op::OpFwidthCoarse:
+        case Op::OpDPdxCoarse:
+        case Op::OpDPdyCoarse:
+        case Op::OpFwidthCoarse:
             reject("derivatives in a compute shader are not supported");
         default: return false;
     }
