@@ -139,10 +139,10 @@ StabilityFigures judge(const StabilitySubject& subject, const Batch& batch) {
         const int angle =
             decade_bin(subject.lower_cosine(words), -StabilityFigures::angle_bins, StabilityFigures::angle_bins);
         figures.error_by_angle[angle] = std::max(figures.error_by_angle[angle], largest);
-        if (subject.on_host && !subject.is_judged_by_host && i % 64 == 17) {
+        if (subject.on_host && i % 64 == 17) {
             std::ranges::fill(closed, std::numeric_limits<double>::quiet_NaN());
             const std::size_t set = subject.shader.parameter_words;
-            subject.on_host(words, 1, set > 0 ? &batch.parameters[i / 64 * set] : nullptr, closed.data());
+            subject.on_host(words, set > 0 ? &batch.parameters[i / 64 * set] : nullptr, closed.data());
             for (std::size_t k = 0; k < width; ++k) {
                 if (std::isnan(closed[k])) continue;
                 const double scale = subject.results[k] == ResultKind::lobe ? at_light : 1.0;
@@ -188,24 +188,17 @@ void for_all(std::size_t count, const Function& function) {
         });
 }
 
-void compute_reference(const StabilitySubject& subject, Batch& batch) {
-    const std::size_t width = subject.results.size();
-    batch.reference.resize(width * batch.count);
-    for_all((batch.count + 63) / 64, [&](std::size_t group) {
-        const auto first = static_cast<std::uint32_t>(64 * group);
-        const std::uint32_t count = std::min(64u, batch.count - first);
-        std::vector<double> values(width * count, 0.0);
-        const std::size_t set = subject.shader.parameter_words;
-        subject.on_host(&batch.points[std::size_t{first} * subject.shader.point_words], count,
-                        set > 0 ? &batch.parameters[group * set] : nullptr, values.data());
-        std::ranges::transform(values, &batch.reference[width * first],
-                               [](double value) { return static_cast<float>(value); });
-    });
+// Whether a shader's large calls are made one after the other. Drivers put every function in the place of its calls,
+// and take minutes for a deep tree; the backend `cpu` compiles what products use.
+bool defers_calls(const rhi::Device& device, const StabilitySubject& subject) {
+    return subject.deferred_calls > 2 && device.adapter().backend != "cpu";
 }
 
-PointShaderDesc variant(const StabilitySubject& subject, const char* define, bool has_candidates) {
+PointShaderDesc variant(const rhi::Device& device, const StabilitySubject& subject, const char* define,
+                        bool has_candidates) {
     PointShaderDesc desc = subject.shader;
     desc.defines += fmt::format("#define {} 1\n", define);
+    if (defers_calls(device, subject)) desc.defines += fmt::format("#define DEFERRED_CALLS {}u\n", subject.deferred_calls);
     desc.capacity = batch_points;
     desc.has_candidates = has_candidates;
     desc.parameter_words *= batch_points / 64;
@@ -283,7 +276,7 @@ Expected<void> test_samplers(rhi::Device& device, const StabilitySubject& subjec
     row.has_sampler = true;
     StabilitySubject sampled = subject;
     sampled.shader.result_words = 8;
-    NACRE_TRY(PointShader shader, PointShader::make(device, variant(sampled, "SAMPLES", false)));
+    NACRE_TRY(PointShader shader, PointShader::make(device, variant(device, sampled, "SAMPLES", false)));
     const std::size_t stride = is_short ? 5 : 1;
     std::vector<SamplerTest> tests;
     for (std::size_t c = 0; c < subject.samplings.size(); c += stride) {
@@ -335,6 +328,7 @@ void StabilityFigures::add(const StabilityFigures& other) {
     negative += other.negative;
     facets += other.facets;
     seconds += other.seconds;
+    first_seconds += other.first_seconds;
     if (other.max_rel_error > max_rel_error) max_rel_error = other.max_rel_error, at = other.at;
     if (other.closed_error > closed_error) closed_error = other.closed_error, closed_at = other.closed_at;
     if (other.reciprocity > reciprocity) reciprocity = other.reciprocity, reciprocity_at = other.reciprocity_at;
@@ -357,11 +351,10 @@ std::uint64_t stability_samples(std::uint64_t points) {
 Expected<StabilityFigures> measure_subject(rhi::Device& device, rhi::Device& reference, const StabilitySubject& subject,
                                  std::uint64_t points, std::uint64_t seed) {
     const bool follows = std::ranges::find(subject.results, ResultKind::direction) != subject.results.end();
-    NACRE_TRY(PointShader candidate_shader, PointShader::make(device, variant(subject, "CANDIDATE", false)));
-    PointShader reference_shader;
-    if (!subject.is_judged_by_host) {
-        NACRE_TRY(reference_shader, PointShader::make(reference, variant(subject, "REFERENCE", follows)));
-    }
+    const auto start = Clock::now();
+    NACRE_TRY(PointShader candidate_shader, PointShader::make(device, variant(device, subject, "CANDIDATE", false)));
+    NACRE_TRY(PointShader reference_shader,
+              PointShader::make(reference, variant(reference, subject, "REFERENCE", follows)));
     StabilityFigures figures;
     const auto make = [&](std::uint64_t number) {
         auto batch = std::make_unique<Batch>();
@@ -371,7 +364,6 @@ Expected<StabilityFigures> measure_subject(rhi::Device& device, rhi::Device& ref
         if (batch->count > 0) fill(subject, *batch);
         return batch;
     };
-    const auto start = Clock::now();
     std::unique_ptr<Batch> last;  // outlives who reads it
     std::future<std::unique_ptr<Batch>> next = std::async(std::launch::async, make, 0);
     std::future<StabilityFigures> judged;
@@ -381,18 +373,14 @@ Expected<StabilityFigures> measure_subject(rhi::Device& device, rhi::Device& ref
         if (!is_end) {
             next = std::async(std::launch::async, make, number + 1);
             NACRE_CHECK(candidate_shader.run(batch->points, {}, batch->parameters, batch->count, batch->candidate));
-            if (!subject.is_judged_by_host) {
-                NACRE_CHECK(reference_shader.run(batch->points, batch->candidate, batch->parameters, batch->count,
-                                                 batch->reference));
-            }
+            if (number == 0) figures.first_seconds = seconds_since(start);
+            NACRE_CHECK(reference_shader.run(batch->points, batch->candidate, batch->parameters, batch->count,
+                                             batch->reference));
         }
         if (judged.valid()) figures.add(judged.get());
         if (is_end) break;
         last = std::move(batch);
-        judged = std::async(std::launch::async, [&subject, &last] {
-            if (subject.is_judged_by_host) compute_reference(subject, *last);
-            return judge(subject, *last);
-        });
+        judged = std::async(std::launch::async, [&subject, &last] { return judge(subject, *last); });
     }
     figures.seconds = seconds_since(start);
     return figures;
@@ -461,17 +449,24 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
             row->devices.resize(devices.size());
             for (std::size_t d = 0; d < devices.size(); ++d) row->devices[d].backend = desc.backends[d];
         }
+        // At once, since drivers compile on one core only.
+        std::vector<std::future<Expected<StabilityFigures>>> measured;
         for (std::size_t d = 0; d < devices.size(); ++d) {
-            // At least one batch: what is smaller costs no less.
             const auto points = static_cast<std::uint64_t>(
                 std::ceil(static_cast<double>(d == 0 ? desc.points : desc.points / 10) * subject.share / shares));
-            NACRE_TRY(const StabilityFigures figures,
-                      measure_subject(*devices[d], **reference, subject, points, 1000 * s + d));
+            measured.push_back(std::async(std::launch::async, [&, d, points] {
+                return measure_subject(*devices[d], **reference, subject, points, 1000 * s + d);
+            }));
+        }
+        auto furnaces =
+            std::async(std::launch::async, [&] { return measure_furnaces(subject, is_short, *row); });
+        NACRE_CHECK(test_samplers(*devices.front(), subject, report.samples, first, is_short, limit, *row));
+        NACRE_CHECK(furnaces.get());
+        for (std::size_t d = 0; d < devices.size(); ++d) {
+            NACRE_TRY(const StabilityFigures figures, measured[d].get());
             row->devices[d].add(figures);
             row->all.add(figures);
         }
-        NACRE_CHECK(measure_furnaces(subject, is_short, *row));
-        NACRE_CHECK(test_samplers(*devices.front(), subject, report.samples, first, is_short, limit, *row));
         report.seconds = seconds_since(start);
         if (desc.on_progress) desc.on_progress(report);
     }

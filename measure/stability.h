@@ -60,7 +60,8 @@ struct StabilityFigures {
     double weight_max = 0.0;     ///< Largest weight of a sample.
     std::array<std::uint64_t, error_bins> errors{};    ///< Results by error.
     std::array<double, angle_bins> error_by_angle{};   ///< Largest error by the lower cosine.
-    double seconds = 0.0;                              ///< Of this device and its reference.
+    double seconds = 0.0;        ///< Of this device and its reference, beside all that runs at the same time.
+    double first_seconds = 0.0;  ///< Of them, until the device had computed its first points: it compiles until then.
     void add(const StabilityFigures& other);
 };
 

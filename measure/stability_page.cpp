@@ -24,6 +24,8 @@ Json figures_json(const StabilityFigures& f) {
                 {"max_rel_error", finite(f.max_rel_error)},
                 {"at", f.at},
                 {"facets", f.facets},
+                {"seconds", f.seconds},
+                {"first_seconds", f.first_seconds},
                 {"points_per_second", f.seconds > 0.0 ? static_cast<double>(f.points) / f.seconds : 0.0}};
 }
 

@@ -117,11 +117,19 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
     std::string main;
     for (const EmbeddedFile& file : embedded_files())
         if (file.path == "measure/stability_tree.glsl") main = file.text;
+    const auto is_deferred = [](const Step& step) {
+        return step.kind == StepKind::slab_matter || step.kind == StepKind::layer_matter ||
+               step.kind == StepKind::path_through_layer;
+    };
+    subject.deferred_calls = static_cast<std::uint32_t>(std::ranges::count_if(flat.topology.steps, is_deferred));
     subject.shader = {
         .name = "tree",
         .text = fmt::format("vec3 specular_lut(uint index, vec2 at) {{ return vec3(1.0); }}\n"
-                            "float tree_parameter(uint index) {{ return parameters[gl_WorkGroupID.x * {}u + "
-                            "index]; }}\nvec4 tree_texture(uint index) {{ return vec4(1.0); }}\n{}\n{}",
+                            "vec4 tree_texture(uint index) {{ return vec4(1.0); }}\n"
+                            "#define TREE_PARAMETERS {}u\n"
+                            "#ifdef DEFERRED_CALLS\n#include \"measure/stability_deferred.glsl\"\n#else\n"
+                            "float tree_parameter(uint index) {{ return parameters[gl_WorkGroupID.x * "
+                            "TREE_PARAMETERS + index]; }}\n#endif\n{}\n{}",
                             shader.parameters.size(), shader.glsl, main),
         .point_words = sizeof(TreePoint) / 4,
         .result_words = static_cast<std::uint32_t>(subject.results.size()),
@@ -164,10 +172,7 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
             }
         }
     };
-    subject.is_judged_by_host = true;
-    subject.note = "Judged by the host in double precision.";
-    const std::size_t width = subject.results.size();
-    subject.on_host = [=](const std::uint32_t* words, std::uint32_t count, const float* parameters, double* values) {
+    subject.on_host = [=](const std::uint32_t* words, const float* parameters, double* values) {
         FlattenedTree changed = flat;
         std::ranges::fill(changed.topology.thickness, -1.0f);
         for (std::size_t i = 0; i < sources->size(); ++i) {
@@ -177,34 +182,14 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
             else source.field->set(node.slab, source.channel, parameters[i]);
         }
         Library library;
-        for (std::uint32_t i = 0; i < count; ++i, words += sizeof(TreePoint) / 4, values += width) {
-            const auto p = point_of<TreePoint>(words);
-            const ShadedTree shaded = shade(changed, p.view, p.footprint);
-            const glm::dvec3 value = reflected(shaded, p.light);
-            const glm::dvec3 through = library.matter_throughput(shaded.whole);
-            for (int channel = 0; channel < 3; ++channel)
-                values[channel] = value[channel], values[3 + channel] = through[channel];
-            values[6] = shaded.whole.coverage;
-            values[7] = shaded.top.coverage;
-            values[8] = 1.0;
-            for (const ShadedClosure& c : shaded.closures) {
-                const double weight = std::max({c.path.weight.x, c.path.weight.y, c.path.weight.z}) * c.coverage;
-                // What the lobes would send if they reflected everything: as lobe_scale() of stability_functions.glsl.
-                // Below a layer the lobes are in refracted directions.
-                const glm::dvec3 light = library.refracted_direction(p.light, c.closure.ior_excess);
-                const glm::dvec3 h = library.half_vector(c.closure.view, light);
-                double scale = library.specular_lobe_pdf(c.closure.specular, c.closure.view, light, h);
-                if ((c.slab.features & slab_second_lobe) != 0)
-                    scale += library.specular_lobe_pdf(c.closure.second, c.closure.view, light, h);
-                if (c.closure.ior_excess > 0.0) {
-                    scale += library.specular_lobe_pdf(c.closure.again, c.closure.again_view, light,
-                                                       library.half_vector(c.closure.again_view, light));
-                    scale *= std::max(double{p.light.z}, 0.0) / (std::pow(1.0 + c.closure.ior_excess, 2.0) * light.z);
-                }
-                if ((c.slab.features & slab_fuzz) != 0) scale += library.sheen_density(c.closure.fuzz_map, p.light);
-                values[8] += weight * scale;
-            }
-        }
+        const auto p = point_of<TreePoint>(words);
+        const ShadedTree shaded = shade(changed, p.view, p.footprint);
+        const glm::dvec3 value = reflected(shaded, p.light);
+        const glm::dvec3 through = library.matter_throughput(shaded.whole);
+        for (int channel = 0; channel < 3; ++channel)
+            values[channel] = value[channel], values[3 + channel] = through[channel];
+        values[6] = shaded.whole.coverage;
+        values[7] = shaded.top.coverage;
     };
     return subject;
 }
