@@ -118,18 +118,9 @@ void main() {
 
 #else
 
-void main() {
-    place = gl_GlobalInvocationID.x * POINT_WORDS;
-    Slab slab = next_slab();
-    vec3 view = next3();
-    vec3 light = next3();
-    vec3 random = next3();
-    float footprint = next();
-    Closure closure = prepare_closure(slab, view, footprint);
-    ClosureValue value = evaluate_closure(closure, light);
+// `value` and `pdf`: those of `light`.
+void put_closure(uint at, Slab slab, Closure closure, vec3 view, vec3 light, ClosureValue value, float pdf) {
     ClosureAlbedo albedo = closure_albedo(closure);
-    float sampled = whole_albedo(closure);
-    uint at = gl_GlobalInvocationID.x * RESULT_WORDS;
     put3(at, value.specular);
     put3(at + 3u, value.diffuse + value.subsurface);
     put3(at + 6u, albedo.specular + albedo.fuzz);
@@ -141,32 +132,57 @@ void main() {
 #else
     put(at + 18u, slab.coverage);
 #endif
-    put(at + 19u, closure_pdf(closure, light) * sampled);
+    put(at + 19u, pdf * whole_albedo(closure));
+}
+
+void main() {
+    place = gl_GlobalInvocationID.x * POINT_WORDS;
+    Slab slab = next_slab();
+    vec3 view = next3();
+    vec3 light = next3();
+    vec3 random = next3();
+    float footprint = next();
+    uint at = gl_GlobalInvocationID.x * RESULT_WORDS;
 #ifdef CANDIDATE
-    ClosureSample picked = sample_closure(closure, random);
-    put3(at + 20u, picked.direction);
-    put3(at + 23u, picked.weight);
-    put(at + 26u, picked.pdf * sampled);
-    put(at + 27u, picked.is_mirror || picked.pdf <= 0.0 ? 1.0 : 0.0);
     put(at + 28u, 0.0);
     put(at + 29u, 0.0);
-    // These cost as much again: one group in four.
-    if ((gl_WorkGroupID.x & 3u) == 0u) {
-        if (light.z > 0.0) {
-            vec3 there = whole_value(closure, light) / light.z;
-            vec3 back = whole_value(prepare_closure(slab, light, footprint), closure.view) / closure.view.z;
-            put(at + 28u, defect(there, back, lobe_scale(closure, light) / light.z));
+    ClosureSample picked;
+    picked.direction = light;
+    vec3 seen = view;
+    vec3 there = vec3(0.0);
+    float there_scale = 0.0;
+    // To the light, to the sample, and back from the light: by a loop, since drivers put every function in the place of
+    // its calls. The last two cost as much again: one group in four.
+    uint turns = (gl_WorkGroupID.x & 3u) == 0u ? 3u : 1u;
+    for (uint turn = 0u; turn < turns; ++turn) {
+        Closure closure = prepare_closure(slab, turn == 2u ? light : view, footprint);
+        vec3 to = turn == 0u ? light : turn == 1u ? picked.direction : seen;
+        ClosureValue value = evaluate_closure(closure, to);
+        vec3 whole = value.specular + value.diffuse + value.subsurface;
+        float pdf = closure_pdf(closure, to);
+        float scale = lobe_scale(closure, to);
+        if (turn == 0u) {
+            put_closure(at, slab, closure, view, light, value, pdf);
+            picked = sample_closure(closure, random);
+            put3(at + 20u, picked.direction);
+            put3(at + 23u, picked.weight);
+            put(at + 26u, picked.pdf * whole_albedo(closure));
+            put(at + 27u, picked.is_mirror || picked.pdf <= 0.0 ? 1.0 : 0.0);
+            seen = closure.view;
+            there = whole / light.z;
+            there_scale = scale / light.z;
         }
-        if (!picked.is_mirror && picked.pdf > 0.0)
-            put(at + 29u, defect(picked.weight * closure_pdf(closure, picked.direction),
-                                 whole_value(closure, picked.direction), lobe_scale(closure, picked.direction)));
+        if (turn == 1u && !picked.is_mirror && picked.pdf > 0.0)
+            put(at + 29u, defect(picked.weight * pdf, whole, scale));
+        if (turn == 2u && light.z > 0.0) put(at + 28u, defect(there, whole / seen.z, there_scale));
     }
 #else
-    uint from = gl_GlobalInvocationID.x * RESULT_WORDS + 20u;
-    vec3 direction = vec3(candidates[from], candidates[from + 1u], candidates[from + 2u]);
+    Closure closure = prepare_closure(slab, view, footprint);
+    put_closure(at, slab, closure, view, light, evaluate_closure(closure, light), closure_pdf(closure, light));
+    vec3 direction = vec3(candidates[at + 20u], candidates[at + 21u], candidates[at + 22u]);
     float pdf = closure_pdf(closure, direction);
     put3(at + 23u, pdf > 0.0 ? whole_value(closure, direction) / pdf : vec3(0.0));
-    put(at + 26u, pdf * sampled);
+    put(at + 26u, pdf * whole_albedo(closure));
     put(at + 30u, lobe_scale(closure, light));
     put(at + 31u, lobe_scale(closure, direction));
 #endif

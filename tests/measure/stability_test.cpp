@@ -133,6 +133,50 @@ TEST(Stability, FindsTheTextbookDistribution) {
     EXPECT_THAT(figures->at, HasSubstr("roughness"));
 }
 
+// Drivers get a tree's text with its large calls made one after the other behind it, and its closures in a loop: that
+// must come to what the text as it stands comes to.
+TEST(Stability, DeferredCallsGiveWhatTheTextGives) {
+    const rhi::Instance instance(all_backends());
+    const auto device = instance.create_device({.backend = "cpu:double"});
+    ASSERT_TRUE(device) << device.error().message();
+    const auto trees = tree_subjects(6);
+    ASSERT_TRUE(trees) << trees.error().message();
+    const StabilitySubject& tree = trees->back();
+    EXPECT_THAT(tree.shader.text, HasSubstr("= slab_matter("));
+    EXPECT_THAT(tree.shader.text, HasSubstr("= layer_matter("));
+    EXPECT_THAT(tree.shader.text, HasSubstr("= path_through_layer("));
+    constexpr std::uint32_t count = 4096;
+    Random random(9);
+    std::vector<std::uint32_t> points(std::size_t{count} * tree.shader.point_words);
+    for (std::uint32_t i = 0; i < count; ++i)
+        tree.make_point(random, &points[std::size_t{i} * tree.shader.point_words]);
+    std::vector<float> parameters, exact, results;
+    tree.make_parameters(random, count / 64, parameters);
+    const auto run = [&](const std::string& defines, std::vector<float>& to) {
+        PointShaderDesc desc = tree.shader;
+        desc.defines += defines;
+        desc.capacity = count;
+        desc.parameter_words *= count / 64;
+        auto shader = PointShader::make(**device, desc);
+        ASSERT_TRUE(shader) << shader.error().message();
+        ASSERT_TRUE(shader->run(points, {}, parameters, count, to));
+    };
+    run("", exact);
+    const std::string deferred = "#define DEFERRED_CALLS " + std::to_string(tree.deferred_calls) + "u\n";
+    for (const std::string& defines : {std::string("#define REFERENCE 1\n"), deferred}) {
+        run(defines, results);
+        ASSERT_EQ(results.size(), exact.size());
+        std::size_t lit = 0;
+        for (std::size_t i = 0; i < results.size(); ++i) {
+            // Without a loop over the closures there is no scale of their lobes.
+            if (i % tree.results.size() == 8) continue;
+            lit += exact[i] > 0.0f;
+            ASSERT_LE(std::abs(results[i] - exact[i]), 1e-6f * exact[i] + 1e-30f) << defines << i;
+        }
+        EXPECT_GT(lit, results.size() / 2);
+    }
+}
+
 // Some devices fuse products and sums, which hides differences of rounded products: this one does not.
 TEST(Stability, FilmsKeepTheirDigitsWhereNothingIsFused) {
     const rhi::Instance instance(all_backends());
