@@ -189,9 +189,10 @@ void for_all(std::size_t count, const Function& function) {
 }
 
 // Whether a shader's large calls are made one after the other. Drivers put every function in the place of its calls,
-// and take minutes for a deep tree; the backend `cpu` compiles what products use.
+// which takes minutes for a deep tree; of few slabs, each with its own features, that is less than once all features. The
+// backend `cpu` in single precision compiles what products use.
 bool defers_calls(const rhi::Device& device, const StabilitySubject& subject) {
-    return subject.deferred_calls > 2 && device.adapter().backend != "cpu";
+    return subject.deferred_calls > 24 && device.desc().backend != "cpu";
 }
 
 PointShaderDesc variant(const rhi::Device& device, const StabilitySubject& subject, const char* define,

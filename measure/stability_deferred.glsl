@@ -7,7 +7,8 @@
 //
 // The text runs round by round. In each the call whose turn it is keeps its operands only; it is computed behind the
 // text, where each function stands once, and has its result from the next round on. Calls before it have theirs; what
-// those after it give does not count yet. Defined before: DEFERRED_CALLS and TREE_PARAMETERS, how many there are.
+// those after it give does not count yet. Defined before: DEFERRED_CALLS, how many
+// there are.
 
 // A closure that is yet to be prepared.
 struct Unprepared {
@@ -37,8 +38,12 @@ Matter turn_top;
 Matter turn_base;
 Widening turn_widening;
 
+// Of the call that the text comes to, 1 or 0. As a loop where a condition would do: what has no loop in it is one block to
+// these drivers, and they take more than twice as long for twice the block.
+uint is_turn() { return deferred_call == deferred_turn ? 1u : 0u; }
+
 Matter deferred_slab_matter(Unprepared closure) {
-    if (deferred_call == deferred_turn) {
+    for (uint turns = is_turn(); turns > 0u; --turns) {
         turn_kind = slab_call;
         turn_closure = closure;
     }
@@ -46,7 +51,7 @@ Matter deferred_slab_matter(Unprepared closure) {
 }
 
 Matter deferred_layer_matter(Matter top, Matter base) {
-    if (deferred_call == deferred_turn) {
+    for (uint turns = is_turn(); turns > 0u; --turns) {
         turn_kind = layer_call;
         turn_top = top;
         turn_base = base;
@@ -55,7 +60,7 @@ Matter deferred_layer_matter(Matter top, Matter base) {
 }
 
 Path deferred_path_through_layer(Path path, Matter top, Matter base, Widening widening) {
-    if (deferred_call == deferred_turn) {
+    for (uint turns = is_turn(); turns > 0u; --turns) {
         turn_kind = path_call;
         turn_path = path;
         turn_top = top;
@@ -80,13 +85,7 @@ void take_turn() {
 // `count`, in a way that no compiler sees through: loops that count so far are not unrolled.
 uint unknown(uint count) { return points.length() > 0 ? count : 0u; }
 
-// Read once for all rounds.
-float tree_parameters[TREE_PARAMETERS];
-float tree_parameter(uint index) { return tree_parameters[index]; }
-
 void begin_rounds() {
-    for (uint i = 0u; i < unknown(TREE_PARAMETERS); ++i)
-        tree_parameters[i] = parameters[gl_WorkGroupID.x * TREE_PARAMETERS + i];
     for (uint i = 0u; i < unknown(DEFERRED_CALLS); ++i) {
         deferred_matters[i] = no_matter();
         deferred_paths[i] = open_path();

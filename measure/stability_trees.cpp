@@ -125,11 +125,9 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
     subject.shader = {
         .name = "tree",
         .text = fmt::format("vec3 specular_lut(uint index, vec2 at) {{ return vec3(1.0); }}\n"
-                            "vec4 tree_texture(uint index) {{ return vec4(1.0); }}\n"
-                            "#define TREE_PARAMETERS {}u\n"
-                            "#ifdef DEFERRED_CALLS\n#include \"measure/stability_deferred.glsl\"\n#else\n"
-                            "float tree_parameter(uint index) {{ return parameters[gl_WorkGroupID.x * "
-                            "TREE_PARAMETERS + index]; }}\n#endif\n{}\n{}",
+                            "float tree_parameter(uint index) {{ return parameters[gl_WorkGroupID.x * {}u + "
+                            "index]; }}\nvec4 tree_texture(uint index) {{ return vec4(1.0); }}\n"
+                            "#ifdef DEFERRED_CALLS\n#include \"measure/stability_deferred.glsl\"\n#endif\n{}\n{}",
                             shader.parameters.size(), shader.glsl, main),
         .point_words = sizeof(TreePoint) / 4,
         .result_words = static_cast<std::uint32_t>(subject.results.size()),
