@@ -348,14 +348,34 @@ std::uint64_t stability_samples(std::uint64_t points) {
     return std::clamp<std::uint64_t>(points / 25, 100'000, 4'000'000);
 }
 
+namespace {
+
+// A subject in double precision, compiled once for all devices, which take turns.
+class Reference {
+  public:
+    Reference(rhi::Device& device, const StabilitySubject& subject) : device_(device), subject_(subject) {}
+
+    Expected<void> run(Batch& batch) {
+        const std::scoped_lock lock(mutex_);
+        if (!shader_) {
+            const bool follows = std::ranges::find(subject_.results, ResultKind::direction) != subject_.results.end();
+            NACRE_TRY(shader_, PointShader::make(device_, variant(device_, subject_, "REFERENCE", follows)));
+        }
+        return shader_->run(batch.points, batch.candidate, batch.parameters, batch.count, batch.reference);
+    }
+
+  private:
+    rhi::Device& device_;
+    const StabilitySubject& subject_;
+    std::mutex mutex_;
+    std::optional<PointShader> shader_;
+};
+
 // The next batch is made, and the last one judged, while devices work.
-Expected<StabilityFigures> measure_subject(rhi::Device& device, rhi::Device& reference, const StabilitySubject& subject,
-                                 std::uint64_t points, std::uint64_t seed) {
-    const bool follows = std::ranges::find(subject.results, ResultKind::direction) != subject.results.end();
+Expected<StabilityFigures> measure_on(rhi::Device& device, Reference& reference, const StabilitySubject& subject,
+                                      std::uint64_t points, std::uint64_t seed) {
     const auto start = Clock::now();
     NACRE_TRY(PointShader candidate_shader, PointShader::make(device, variant(device, subject, "CANDIDATE", false)));
-    NACRE_TRY(PointShader reference_shader,
-              PointShader::make(reference, variant(reference, subject, "REFERENCE", follows)));
     StabilityFigures figures;
     const auto make = [&](std::uint64_t number) {
         auto batch = std::make_unique<Batch>();
@@ -375,8 +395,7 @@ Expected<StabilityFigures> measure_subject(rhi::Device& device, rhi::Device& ref
             next = std::async(std::launch::async, make, number + 1);
             NACRE_CHECK(candidate_shader.run(batch->points, {}, batch->parameters, batch->count, batch->candidate));
             if (number == 0) figures.first_seconds = seconds_since(start);
-            NACRE_CHECK(reference_shader.run(batch->points, batch->candidate, batch->parameters, batch->count,
-                                             batch->reference));
+            NACRE_CHECK(reference.run(*batch));
         }
         if (judged.valid()) figures.add(judged.get());
         if (is_end) break;
@@ -385,6 +404,14 @@ Expected<StabilityFigures> measure_subject(rhi::Device& device, rhi::Device& ref
     }
     figures.seconds = seconds_since(start);
     return figures;
+}
+
+}  // namespace
+
+Expected<StabilityFigures> measure_subject(rhi::Device& device, rhi::Device& reference, const StabilitySubject& subject,
+                                           std::uint64_t points, std::uint64_t seed) {
+    Reference exact(reference, subject);
+    return measure_on(device, exact, subject, points, seed);
 }
 
 Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const StabilityDesc& desc) {
@@ -451,12 +478,13 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
             for (std::size_t d = 0; d < devices.size(); ++d) row->devices[d].backend = desc.backends[d];
         }
         // At once, since drivers compile on one core only.
+        Reference exact(**reference, subject);
         std::vector<std::future<Expected<StabilityFigures>>> measured;
         for (std::size_t d = 0; d < devices.size(); ++d) {
             const auto points = static_cast<std::uint64_t>(
                 std::ceil(static_cast<double>(d == 0 ? desc.points : desc.points / 10) * subject.share / shares));
             measured.push_back(std::async(std::launch::async, [&, d, points] {
-                return measure_subject(*devices[d], **reference, subject, points, 1000 * s + d);
+                return measure_on(*devices[d], exact, subject, points, 1000 * s + d);
             }));
         }
         auto furnaces =
