@@ -142,7 +142,7 @@ StabilityFigures judge(const StabilitySubject& subject, const Batch& batch) {
         if (subject.on_host && i % 64 == 17) {
             std::ranges::fill(closed, std::numeric_limits<double>::quiet_NaN());
             const std::size_t set = subject.shader.parameter_words;
-            subject.on_host(words, set > 0 ? &batch.parameters[i / 64 * set] : nullptr, closed.data());
+            subject.on_host(words, 1, set > 0 ? &batch.parameters[i / 64 * set] : nullptr, closed.data());
             for (std::size_t k = 0; k < width; ++k) {
                 if (std::isnan(closed[k])) continue;
                 const double scale = subject.results[k] == ResultKind::lobe ? at_light : 1.0;
@@ -186,6 +186,21 @@ void for_all(std::size_t count, const Function& function) {
         threads.emplace_back([&] {
             for (std::size_t i = next++; i < count; i = next++) function(i);
         });
+}
+
+void compute_reference(const StabilitySubject& subject, Batch& batch) {
+    const std::size_t width = subject.results.size();
+    batch.reference.resize(width * batch.count);
+    for_all((batch.count + 63) / 64, [&](std::size_t group) {
+        const auto first = static_cast<std::uint32_t>(64 * group);
+        const std::uint32_t count = std::min(64u, batch.count - first);
+        std::vector<double> values(width * count, 0.0);
+        const std::size_t set = subject.shader.parameter_words;
+        subject.on_host(&batch.points[std::size_t{first} * subject.shader.point_words], count,
+                        set > 0 ? &batch.parameters[group * set] : nullptr, values.data());
+        std::ranges::transform(values, &batch.reference[width * first],
+                               [](double value) { return static_cast<float>(value); });
+    });
 }
 
 // Whether a shader's large calls are made one after the other. Drivers put every function in the place of its calls,
@@ -350,12 +365,17 @@ std::uint64_t stability_samples(std::uint64_t points) {
 
 namespace {
 
-// A subject in double precision, compiled once for all devices, which take turns.
+// A subject in double precision, compiled once for all devices, which take turns. points: about how many it is for.
 class Reference {
   public:
-    Reference(rhi::Device& device, const StabilitySubject& subject) : device_(device), subject_(subject) {}
+    Reference(rhi::Device& device, const StabilitySubject& subject, std::uint64_t points)
+        : device_(device), subject_(subject), is_on_host_(subject.is_complete_on_host && points < 100'000) {}
 
     Expected<void> run(Batch& batch) {
+        if (is_on_host_) {
+            compute_reference(subject_, batch);
+            return {};
+        }
         const std::scoped_lock lock(mutex_);
         if (!shader_) {
             const bool follows = std::ranges::find(subject_.results, ResultKind::direction) != subject_.results.end();
@@ -367,6 +387,7 @@ class Reference {
   private:
     rhi::Device& device_;
     const StabilitySubject& subject_;
+    const bool is_on_host_;
     std::mutex mutex_;
     std::optional<PointShader> shader_;
 };
@@ -410,7 +431,7 @@ Expected<StabilityFigures> measure_on(rhi::Device& device, Reference& reference,
 
 Expected<StabilityFigures> measure_subject(rhi::Device& device, rhi::Device& reference, const StabilitySubject& subject,
                                            std::uint64_t points, std::uint64_t seed) {
-    Reference exact(reference, subject);
+    Reference exact(reference, subject, points);
     return measure_on(device, exact, subject, points, seed);
 }
 
@@ -477,14 +498,16 @@ Expected<StabilityReport> measure_stability(const rhi::Instance& instance, const
             row->devices.resize(devices.size());
             for (std::size_t d = 0; d < devices.size(); ++d) row->devices[d].backend = desc.backends[d];
         }
+        const auto points_on = [&](std::size_t device) {
+            return static_cast<std::uint64_t>(
+                std::ceil(static_cast<double>(device == 0 ? desc.points : desc.points / 10) * subject.share / shares));
+        };
         // At once, since drivers compile on one core only.
-        Reference exact(**reference, subject);
+        Reference exact(**reference, subject, points_on(0));
         std::vector<std::future<Expected<StabilityFigures>>> measured;
         for (std::size_t d = 0; d < devices.size(); ++d) {
-            const auto points = static_cast<std::uint64_t>(
-                std::ceil(static_cast<double>(d == 0 ? desc.points : desc.points / 10) * subject.share / shares));
-            measured.push_back(std::async(std::launch::async, [&, d, points] {
-                return measure_on(*devices[d], exact, subject, points, 1000 * s + d);
+            measured.push_back(std::async(std::launch::async, [&, d] {
+                return measure_on(*devices[d], exact, subject, points_on(d), 1000 * s + d);
             }));
         }
         auto furnaces =

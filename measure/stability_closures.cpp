@@ -97,8 +97,8 @@ StabilitySubject closure_subject(std::string name, std::string what, std::uint32
         put_point(point, words);
     };
     subject.describe = describe_closure;
-    // The models of the host's library are those of a shader without defines.
-    subject.on_host = [](const std::uint32_t* words, const float*, double* values) {
+    // One point; the models of the host's library are those of a shader without defines.
+    subject.on_host = [](const std::uint32_t* words, std::uint32_t, const float*, double* values) {
         const auto p = point_of<ClosurePoint>(words);
         Library library;
         library.tints = stability_tint;

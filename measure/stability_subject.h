@@ -71,9 +71,12 @@ struct StabilitySubject {
     /// What formulae of other form give for the results, in double precision; NaN where there is none.
     std::function<void(const std::uint32_t* words, double* values)> closed_form;
 
-    /// What the same text gives for the results when it is compiled for the host; the rest is left as it is.
-    /// `parameters`: the set that the point's workgroup has.
-    std::function<void(const std::uint32_t* words, const float* parameters, double* values)> on_host;
+    /// What the same text gives for the results of `count` points in a row when it is compiled for the host; the rest
+    /// is left as it is. `parameters`: the set that these points share.
+    std::function<void(const std::uint32_t* words, std::uint32_t count, const float* parameters, double* values)>
+        on_host;
+    /// `on_host` gives all results: it judges few points, for which a shader in double precision takes too long to compile.
+    bool is_complete_on_host = false;
     /// Large calls in the shader's text that it makes one after the other behind the text where DEFERRED_CALLS says how
     /// many they are (measure/stability_deferred.glsl); 0: it cannot.
     std::uint32_t deferred_calls = 0;

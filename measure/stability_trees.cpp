@@ -170,7 +170,9 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
             }
         }
     };
-    subject.on_host = [=](const std::uint32_t* words, const float* parameters, double* values) {
+    subject.is_complete_on_host = true;
+    const std::size_t width = subject.results.size();
+    subject.on_host = [=](const std::uint32_t* words, std::uint32_t count, const float* parameters, double* values) {
         FlattenedTree changed = flat;
         std::ranges::fill(changed.topology.thickness, -1.0f);
         for (std::size_t i = 0; i < sources->size(); ++i) {
@@ -180,14 +182,34 @@ Expected<StabilitySubject> tree_subject(std::string name, std::string what, cons
             else source.field->set(node.slab, source.channel, parameters[i]);
         }
         Library library;
-        const auto p = point_of<TreePoint>(words);
-        const ShadedTree shaded = shade(changed, p.view, p.footprint);
-        const glm::dvec3 value = reflected(shaded, p.light);
-        const glm::dvec3 through = library.matter_throughput(shaded.whole);
-        for (int channel = 0; channel < 3; ++channel)
-            values[channel] = value[channel], values[3 + channel] = through[channel];
-        values[6] = shaded.whole.coverage;
-        values[7] = shaded.top.coverage;
+        for (std::uint32_t i = 0; i < count; ++i, words += sizeof(TreePoint) / 4, values += width) {
+            const auto p = point_of<TreePoint>(words);
+            const ShadedTree shaded = shade(changed, p.view, p.footprint);
+            const glm::dvec3 value = reflected(shaded, p.light);
+            const glm::dvec3 through = library.matter_throughput(shaded.whole);
+            for (int channel = 0; channel < 3; ++channel)
+                values[channel] = value[channel], values[3 + channel] = through[channel];
+            values[6] = shaded.whole.coverage;
+            values[7] = shaded.top.coverage;
+            values[8] = 1.0;
+            for (const ShadedClosure& c : shaded.closures) {
+                const double weight = std::max({c.path.weight.x, c.path.weight.y, c.path.weight.z}) * c.coverage;
+                // What the lobes would send if they reflected everything: as lobe_scale() of stability_functions.glsl.
+                // Below a layer the lobes are in refracted directions.
+                const glm::dvec3 light = library.refracted_direction(p.light, c.closure.ior_excess);
+                const glm::dvec3 h = library.half_vector(c.closure.view, light);
+                double scale = library.specular_lobe_pdf(c.closure.specular, c.closure.view, light, h);
+                if ((c.slab.features & slab_second_lobe) != 0)
+                    scale += library.specular_lobe_pdf(c.closure.second, c.closure.view, light, h);
+                if (c.closure.ior_excess > 0.0) {
+                    scale += library.specular_lobe_pdf(c.closure.again, c.closure.again_view, light,
+                                                       library.half_vector(c.closure.again_view, light));
+                    scale *= std::max(double{p.light.z}, 0.0) / (std::pow(1.0 + c.closure.ior_excess, 2.0) * light.z);
+                }
+                if ((c.slab.features & slab_fuzz) != 0) scale += library.sheen_density(c.closure.fuzz_map, p.light);
+                values[8] += weight * scale;
+            }
+        }
     };
     return subject;
 }
