@@ -204,8 +204,8 @@ void compute_reference(const StabilitySubject& subject, Batch& batch) {
 }
 
 // Whether a shader's large calls are made one after the other. Drivers put every function in the place of its calls,
-// which takes minutes for a deep tree; of few slabs, each with its own features, that is less than once all features. The
-// backend `cpu` in single precision compiles what products use.
+// which takes minutes for a deep tree; of few slabs, each with its own features, that is less than once all features.
+// The backend `cpu` in single precision compiles what products use.
 bool defers_calls(const rhi::Device& device, const StabilitySubject& subject) {
     return subject.deferred_calls > 24 && device.desc().backend != "cpu";
 }
@@ -214,7 +214,8 @@ PointShaderDesc variant(const rhi::Device& device, const StabilitySubject& subje
                         bool has_candidates) {
     PointShaderDesc desc = subject.shader;
     desc.defines += fmt::format("#define {} 1\n", define);
-    if (defers_calls(device, subject)) desc.defines += fmt::format("#define DEFERRED_CALLS {}u\n", subject.deferred_calls);
+    if (defers_calls(device, subject))
+        desc.defines += fmt::format("#define DEFERRED_CALLS {}u\n", subject.deferred_calls);
     desc.capacity = batch_points;
     desc.has_candidates = has_candidates;
     desc.parameter_words *= batch_points / 64;

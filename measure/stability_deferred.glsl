@@ -38,8 +38,8 @@ Matter turn_top;
 Matter turn_base;
 Widening turn_widening;
 
-// Of the call that the text comes to, 1 or 0. As a loop where a condition would do: what has no loop in it is one block to
-// these drivers, and they take more than twice as long for twice the block.
+// 1 where the text has come to the call whose turn it is. For a loop where a condition would do: what has no loop in it
+// is one block to these drivers, and parts of their compilers take longer than in proportion to a block's length.
 uint is_turn() { return deferred_call == deferred_turn ? 1u : 0u; }
 
 Matter deferred_slab_matter(Unprepared closure) {

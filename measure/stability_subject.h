@@ -75,7 +75,8 @@ struct StabilitySubject {
     /// is left as it is. `parameters`: the set that these points share.
     std::function<void(const std::uint32_t* words, std::uint32_t count, const float* parameters, double* values)>
         on_host;
-    /// `on_host` gives all results: it judges few points, for which a shader in double precision takes too long to compile.
+    /// `on_host` gives all results: it judges few points, for which a shader in double precision takes too long to
+    /// compile.
     bool is_complete_on_host = false;
     /// Large calls in the shader's text that it makes one after the other behind the text where DEFERRED_CALLS says how
     /// many they are (measure/stability_deferred.glsl); 0: it cannot.

@@ -17,8 +17,8 @@
 namespace nacre::command {
 
 Outcome run(const StabilityArguments& arguments) {
-    // Mesa's software drivers compile many large shaders here, each for few points: without optimization, and beside that
-    // as everywhere (backends/gl/quirks.cpp). What is computed stays the same.
+    // Mesa's software drivers compile many large shaders here, each for few points: without optimization, and beside
+    // that as everywhere (backends/gl/quirks.cpp). What is computed stays the same.
     ::setenv("GALLIVM_PERF", "nopt,no_quad_lod,no_aos_sampling,no_brilinear,no_rho_approx", /*overwrite=*/0);
     const auto instance = make_instance();
     if (!arguments.output.empty()) {
