@@ -98,7 +98,7 @@ ClosureValue evaluate_closure_above(Closure closure, vec3 outside) {
         value.specular += closure.ring * (lambert_scale * light.z * inverse_pi *
                                           ring_density(outside, closure.ring_spread, closure.ring_lean));
     }
-    if (closure.veil > 0.0) value.specular *= veil_transmittance(closure, outside.z);
+    if (closure.is_veiled) value.specular *= veil_transmittance(closure, outside.z);
 #endif
 #ifdef NACRE_SLAB_SPECULAR_LUT
     if ((closure.features & slab_specular_lut) != 0u)
@@ -121,9 +121,12 @@ ClosureValue evaluate_closure_above(Closure closure, vec3 outside) {
     value.diffuse = closure.diffuse * diffuse_lobe(closure, light, half_cosine, h.z);
 #ifdef NACRE_CLOSURE_COVERED
     value.diffuse *= diffuse_scale;
-    if (closure.veil > 0.0)
+    if (closure.is_veiled) {
+        value.diffuse += (closure.upward + closure.upward_rise * (power5(1.0 - light.z) - 1.0 / 21.0)) *
+                         (lambert_scale * light.z * inverse_pi);
         value.diffuse += closure.scattered * (outside.z * inverse_pi * closure.scattered_scale *
                                               thin_density(outside.z, closure.veil_bend, closure.scattered_way));
+    }
 #endif
 #ifdef NACRE_SLAB_MEDIUM
     if ((closure.features & slab_medium) != 0u) {
@@ -297,7 +300,7 @@ ClosureAlbedo closure_albedo(Closure closure) {
     albedo.diffuse = closure.diffuse;
 #ifdef NACRE_CLOSURE_COVERED
     // Surroundings look like diffuse light to it.
-    albedo.diffuse += closure.scattered;
+    albedo.diffuse += closure.scattered + closure.upward;
     if (closure.ior_excess > 0.0) albedo.diffuse += closure.ring_albedo;
 #endif
     albedo.transmission = vec3(0.0);

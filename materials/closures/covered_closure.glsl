@@ -116,40 +116,38 @@ float ring_scale(float width) {
 
 // What lies above a closure, as the view sees it.
 struct Cover {
-    vec3 spread;        // share of what the lobes send that was scattered on its way down or up
+    vec3 spread_up;     // share of what the lobes send that meets the closure as diffuse light
+    vec3 spread_down;   // of the rest, the share that was scattered on its way down
     vec3 mean;          // what the closure's interface reflects of diffuse light
+    vec3 rise;          // and how much more of it along the surface than along the normal
     vec3 kept;          // of light that goes up and down once more, what the medium above leaves
     float bend;         // 1 - 1 / index^2 of the medium that scatters
     float ior_excess;   // index - 1 of what lies directly above, against what the view and the lights outside are in
     float view_cosine;  // outside
 };
 
-// Of what light for a lobe is scattered on its way down and up, about this part of the depth is that of the way up: what
-// is thrown back counts down alone.
-const float upward_share = 0.35;
-
-// Optical depth of both ways by the share that is scattered. Of what is nearly all, 32 bits do not know the rest.
-float spread_depth(float spread) { return minus_log_rest(min(spread, 0.9998)); }
-
-// The share that is scattered on its way up by that on both.
-vec3 scattered_up(vec3 spread) {
-    return vec3(exponential_rest(upward_share * spread_depth(spread.x)),
-                exponential_rest(upward_share * spread_depth(spread.y)),
-                exponential_rest(upward_share * spread_depth(spread.z)));
+// Optical depth by the share that is scattered. Of what is nearly all, 32 bits do not know the rest.
+vec3 spread_depth(vec3 spread) {
+    return vec3(minus_log_rest(min(spread.x, 0.9998)), minus_log_rest(min(spread.y, 0.9998)),
+                minus_log_rest(min(spread.z, 0.9998)));
 }
 
 // What a scattering medium leaves of a lobe's light on its straight way down.
-float veil_transmittance(Closure closure, float cosine) {
-    return exp(-closure.veil *
-               inversesqrt(max(closure.veil_bend + cosine * cosine * (1.0 - closure.veil_bend), 1e-4)));
+vec3 veil_transmittance(Closure closure, float cosine) {
+    float way = inversesqrt(max(closure.veil_bend + cosine * cosine * (1.0 - closure.veil_bend), 1e-4));
+    return exp(min(closure.veil_back - closure.veil * way, vec3(0.0)));
 }
 
-// The same for all of a lobe. Lobes are wide outside, and none of their light comes from below.
-float lobe_veil(Closure closure, SpecularLobe lobe, float view_cosine) {
-    float width = lobe.is_mirror ? 0.0 : min(2.7 * sqrt(lobe.area) * (1.0 + closure.ior_excess), 0.55);
+// About the cosine at which a lobe's light leaves. Lobes are wide outside, and none of their light comes from below.
+float lobe_cosine(float width, float view_cosine) {
     float cosine2 = view_cosine * view_cosine;
-    return veil_transmittance(closure,
-                              sqrt(mix(cosine2, 0.45 - 1.1 * cosine2 * square(1.0 - cosine2), width)));
+    return sqrt(max(mix(cosine2, 0.45 - 1.1 * cosine2 * square(1.0 - cosine2), width), 1e-4));
+}
+
+// The same for all of a lobe.
+vec3 lobe_veil(Closure closure, SpecularLobe lobe, float view_cosine) {
+    float width = lobe.is_mirror ? 0.0 : min(2.7 * sqrt(lobe.area) * (1.0 + closure.ior_excess), 0.55);
+    return veil_transmittance(closure, lobe_cosine(width, view_cosine));
 }
 
 // A closure that is seen through layers, prepared for the view inside. What is scattered on its way does not come along
@@ -157,12 +155,16 @@ float lobe_veil(Closure closure, SpecularLobe lobe, float view_cosine) {
 Closure cover_closure(Closure closure, Cover cover) {
     Closure covered = closure;
     float ior_excess = cover.ior_excess;
-    vec3 up = scattered_up(cover.spread);
+    vec3 up = cover.spread_up;
     vec3 straight = vec3(1.0) - up;
     float bend = cover.bend;
     float slant = sqrt(bend + cover.view_cosine * cover.view_cosine * (1.0 - bend));
-    covered.veil = (1.0 - upward_share) * spread_depth(dot(cover.spread, vec3(1.0 / 3.0))) * max(slant, 0.01);
+    covered.veil = spread_depth(cover.spread_down) * max(slant, 0.01);
+    covered.is_veiled = largest(covered.veil) > 0.0;
     covered.veil_bend = bend;
+    // What is thrown back counts for both.
+    vec3 both = covered.veil / mean_cosine;
+    covered.veil_back = 0.5 * both / (vec3(1.0) + 0.7 * both);
     vec3 specular = closure.specular.albedo;
     covered.specular = scaled_lobe(closure.specular, straight);
 #ifdef NACRE_SLAB_SECOND_LOBE
@@ -173,8 +175,12 @@ Closure cover_closure(Closure closure, Cover cover) {
 #endif
     vec3 whole = specular + closure.entering;
     vec3 entering = mix(vec3(1.0), whole * (vec3(1.0) - cover.mean) / max(closure.entering, vec3(1e-30)), up);
-    covered.diffuse = closure.diffuse * entering + up * whole * cover.mean;
-    covered.scattered_way = covered.veil + 0.04;
+    covered.diffuse = closure.diffuse * entering;
+    covered.upward = up * whole * cover.mean;
+    covered.upward_rise = vec3(0.0);
+    // Below a denser medium no light leaves along the surface.
+    if (ior_excess <= 0.0) covered.upward_rise = up * whole * cover.rise;
+    covered.scattered_way = dot(covered.veil, vec3(1.0 / 3.0)) + 0.04;
     covered.scattered_scale = thin_scale(bend, covered.scattered_way);
 #ifdef NACRE_SLAB_MEDIUM
     if ((closure.features & slab_medium) != 0u) {
@@ -256,21 +262,21 @@ Closure cover_closure(Closure closure, Cover cover) {
         covered.diffuse_scale =
             covered.lambert_scale / mix(1.0, diffuse_below(closure, ior), saturated(5.0 * ior_excess));
     }
-    if (covered.veil > 0.0) {
-        float down = lobe_veil(covered, covered.specular, cover.view_cosine);
-        covered.scattered = covered.specular.albedo * (1.0 - down);
+    if (covered.is_veiled) {
+        vec3 down = lobe_veil(covered, covered.specular, cover.view_cosine);
+        covered.scattered = covered.specular.albedo * (vec3(1.0) - down);
         covered.specular.albedo *= down;
         down = lobe_veil(covered, covered.again, again_cosine);
-        covered.scattered += covered.again.albedo * (1.0 - down);
+        covered.scattered += covered.again.albedo * (vec3(1.0) - down);
         covered.again.albedo *= down;
         // Most of the ring lies along the rim.
         down = veil_transmittance(covered, 0.45);
-        covered.scattered += covered.ring_albedo * (1.0 - down);
+        covered.scattered += covered.ring_albedo * (vec3(1.0) - down);
         covered.ring_albedo *= down;
 #ifdef NACRE_SLAB_SECOND_LOBE
         if ((closure.features & slab_second_lobe) != 0u) {
             down = lobe_veil(covered, covered.second, cover.view_cosine);
-            covered.scattered += covered.second.albedo * (1.0 - down);
+            covered.scattered += covered.second.albedo * (vec3(1.0) - down);
             covered.second.albedo *= down;
         }
 #endif

@@ -138,8 +138,12 @@ struct Closure {
     float ring_spread;      // squared width of the lobe in tangential components
     vec2 ring_lean;         // away from where it is bright
     vec3 entering;          // what the interface lets through to the medium
-    float veil;             // what the medium above takes of a lobe's light on its way down: optical depth
+    bool is_veiled;         // by a medium above that scatters
+    vec3 veil;              // what it takes of a lobe's light on its way down: optical depth
+    vec3 veil_back;         // what of it
     float veil_bend;        // 1 - 1 / index^2 of that medium
+    vec3 upward;            // albedo of the interface for light that is scattered on its way up or thrown back
+    vec3 upward_rise;       // how much more of it comes from along the surface
     vec3 scattered;         // albedo of what does not come along the lobes, for that
     float scattered_way;    // its shape: thin_density
     float scattered_scale;
@@ -391,7 +395,7 @@ Closure with_probabilities(Closure closure) {
     if ((closure.features & slab_medium) != 0u) diffuse += closure.thin + closure.subsurface;
 #endif
 #ifdef NACRE_CLOSURE_COVERED
-    diffuse += closure.scattered;
+    diffuse += closure.scattered + closure.upward;
     if (closure.ior_excess > 0.0) diffuse += closure.ring_albedo;
 #endif
     result.specular_probability = largest(closure.specular.albedo);
@@ -536,8 +540,12 @@ Closure prepare_closure_under(Slab slab, Fresnel bare, vec3 view, float footprin
     closure.ior_excess = 0.0;
     closure.view_cosine = closure.view.z;
     closure.entering = entering;
-    closure.veil = 0.0;
+    closure.is_veiled = false;
+    closure.veil = vec3(0.0);
     closure.veil_bend = 0.0;
+    closure.veil_back = vec3(0.0);
+    closure.upward = vec3(0.0);
+    closure.upward_rise = vec3(0.0);
     closure.scattered = vec3(0.0);
     closure.scattered_way = 1.0;
     closure.scattered_scale = 1.0;
