@@ -164,7 +164,7 @@ Closure cover_closure(Closure closure, Cover cover) {
     covered.veil_bend = bend;
     // What is thrown back counts for both.
     vec3 both = covered.veil / mean_cosine;
-    covered.veil_back = 0.5 * both / (vec3(1.0) + 0.7 * both);
+    covered.veil_back = 0.5 * both / (vec3(1.0) + 1.3 * both);
     vec3 specular = closure.specular.albedo;
     covered.specular = scaled_lobe(closure.specular, straight);
 #ifdef NACRE_SLAB_SECOND_LOBE

@@ -140,7 +140,7 @@ struct Closure {
     vec3 entering;          // what the interface lets through to the medium
     bool is_veiled;         // by a medium above that scatters
     vec3 veil;              // what it takes of a lobe's light on its way down: optical depth
-    vec3 veil_back;         // what of it
+    vec3 veil_back;         // the part of that which is thrown back, counted already
     float veil_bend;        // 1 - 1 / index^2 of that medium
     vec3 upward;            // albedo of the interface for light that is scattered on its way up or thrown back
     vec3 upward_rise;       // how much more of it comes from along the surface
