@@ -37,6 +37,13 @@ elseif(NOT NACRE_SANITIZER STREQUAL "")
   message(FATAL_ERROR "NACRE_SANITIZER is '${NACRE_SANITIZER}'; it can be empty, 'address' or 'thread'")
 endif()
 
+# Links in a quarter of the time; some seventy programs link all of Nacre.
+include(CheckLinkerFlag)
+check_linker_flag(CXX -fuse-ld=gold NACRE_HAS_GOLD)
+if(NACRE_HAS_GOLD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  add_link_options(-fuse-ld=gold)
+endif()
+
 # Tests run once for each compile: optimizing them costs a third more build time than it saves in running.
 set(NACRE_TEST_OPTIONS -O0)
 if(NACRE_SANITIZER STREQUAL "address")
@@ -122,7 +129,8 @@ function(nacre_add_part name)
 endfunction()
 
 # nacre_add_test(<name> SOURCES ... USES <part>... [LIBRARIES ...] [LABELS ...] [TIMEOUT seconds])
-# One GoogleTest program (with GoogleTest's own main() unless a source has one), registered with CTest under its name.
+# One GoogleTest program (with GoogleTest's own main() unless a source has one), registered with CTest under its name. The
+# target tests_<label> builds the tests of a label.
 function(nacre_add_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;USES;LIBRARIES;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)
@@ -139,6 +147,12 @@ function(nacre_add_test name)
   add_test(NAME ${name} COMMAND ${name})
   # What takes long begins first, or it goes on alone at the end.
   set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} COST ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
+  foreach(label IN LISTS ARG_LABELS)
+    if(NOT TARGET tests_${label})
+      add_custom_target(tests_${label})
+    endif()
+    add_dependencies(tests_${label} ${name})
+  endforeach()
 endfunction()
 
 # nacre_add_fuzzer(<name ending in _fuzzer> SOURCES ... USES <part>... [LIBRARIES ...])

@@ -46,6 +46,7 @@ class InliningPlan {
             return found == scalars.end() ? std::uint64_t{1} : found->second;
         };
         std::vector<std::uint32_t> entries;
+        std::vector<std::uint32_t> open_constructs;  // The blocks in which they end, from the outermost.
         FunctionSize* function = nullptr;
         for (const rhi::spirv::Instruction& at : rhi::spirv::instructions(words)) {
             const Op op = static_cast<Op>(at.opcode());
@@ -55,7 +56,12 @@ class InliningPlan {
                                           capability == spv::Capability::VariablePointersStorageBuffer;
             }
             if (function) ++function->own, ++own_instructions_;
-            if (op == Op::OpLabel) ++own_blocks_;
+            if (op == Op::OpLabel) {
+                ++own_blocks_;
+                // Behind the block in which a construct ends none that was opened in it is open any more.
+                if (const auto end = std::ranges::find(open_constructs, at.operand(0)); end != open_constructs.end())
+                    open_constructs.erase(end, open_constructs.end());
+            }
             if (op == Op::OpConstant) constants[at.operand(1)] = at.operand(2);
             if (op == Op::OpTypeArray) {
                 // A length that may be specialized may be any.
@@ -109,7 +115,14 @@ class InliningPlan {
                 case Op::OpControlBarrier: case Op::OpKill: case Op::OpTerminateInvocation:
                     if (function) function->must_inline = true;
                     break;
-                case Op::OpFunctionEnd: function = nullptr; break;
+                case Op::OpSelectionMerge: case Op::OpLoopMerge: open_constructs.push_back(at.operand(0)); break;
+                case Op::OpReturn: case Op::OpReturnValue:
+                    if (function && !open_constructs.empty()) function->returns_early = true;
+                    break;
+                case Op::OpFunctionEnd:
+                    function = nullptr;
+                    open_constructs.clear();
+                    break;
                 default: break;
             }
         }
@@ -141,16 +154,30 @@ class InliningPlan {
         return own_blocks_ * instructions_ / std::max<std::uint64_t>(own_instructions_, 1);
     }
 
+    /// Marks what SPIRV-Tools leaves alone: functions that are kept, and those that return from within a construct, which
+    /// it cannot inline; for each call of one it would write the whole module out as text, to name it in a message.
     void apply(std::vector<std::uint32_t>& words, bool inlines_all) const {
-        constexpr auto dont_inline = static_cast<std::uint32_t>(spv::FunctionControlMask::DontInline);
         for (const auto& [id, function] : functions_) {
             if (!function.control) continue;
-            if (function.is_kept && !inlines_all) words[function.control] |= dont_inline;
+            if ((function.is_kept && !inlines_all) || function.returns_early) words[function.control] |= dont_inline;
             else words[function.control] &= ~dont_inline;
         }
     }
 
+    /// Marks only what is kept, in what SPIRV-Tools made.
+    void apply_to_result(std::vector<std::uint32_t>& words, bool inlines_all) const {
+        std::vector<std::size_t> inlined;
+        for (const rhi::spirv::Instruction& at : rhi::spirv::instructions(words)) {
+            if (static_cast<Op>(at.opcode()) != Op::OpFunction) continue;
+            const auto found = functions_.find(at.operand(1));
+            if (found != functions_.end() && (inlines_all || !found->second.is_kept)) inlined.push_back(at.offset + 3);
+        }
+        for (const std::size_t control : inlined) words[control] &= ~dont_inline;
+    }
+
   private:
+    static constexpr auto dont_inline = static_cast<std::uint32_t>(spv::FunctionControlMask::DontInline);
+
     struct FunctionSize {
         std::size_t control = 0;  ///< Word of its FunctionControl.
         std::uint64_t own = 0;    ///< Instructions.
@@ -158,6 +185,7 @@ class InliningPlan {
         std::uint32_t calls = 0;  ///< Places from which it is called.
         std::vector<std::uint32_t> callees;
         bool is_entry = false, must_inline = false, is_kept = false, is_ordered = false;
+        bool returns_early = false;  ///< From within a construct.
     };
 
     /// Without recursion of its own, since calls may be as deep as there are functions. What an entry point reaches has
@@ -277,10 +305,14 @@ Expected<std::vector<std::uint32_t>> legalize(std::span<const std::uint32_t> wor
     std::vector<std::uint32_t> result;
     if (!optimizer.Run(planned.data(), planned.size(), &result, optimizer_options)) {
         // Simpler is better, not needed; only specialization constants must be frozen.
-        if (!has_specialization) return planned;
+        if (!has_specialization) {
+            plan.apply_to_result(planned, options.inlines_all);
+            return planned;
+        }
         return fail(ErrorCode::shader_compile, "compile shader", fmt::format("'{}'", name),
                     "the module cannot be specialized: " + log, "Check the types of the specialization constants.");
     }
+    plan.apply_to_result(result, options.inlines_all);
     return result;
 }
 
