@@ -33,6 +33,7 @@ set(public_headers
   materials/closures/octahedral.glsl materials/closures/stored_fields.glsl materials/closures/stored_frame.glsl
   materials/closures/table_textures.glsl materials/storage_shader.h
   materials/closures/conversions.glsl materials/closures/medium_inputs.glsl
+  materials/closures/covered_closure.glsl materials/closures/prepared_closure.glsl
   materials/closures/specular_tables.glsl materials/specular_table.h
   materials/closures/thin_film.glsl materials/building_blocks.h materials/builtin_materials.h materials/conversions.h
   materials/custom_material.h materials/description_tree.h materials/evaluation.h materials/layering_error.h

@@ -62,7 +62,8 @@ constexpr StorageFormat formats[] = {
     {StorageValue::weight, "weight", color_bits, StorageCodec::color},
     {StorageValue::path_transmittance, "path transmittance", color_bits, StorageCodec::color},
     {StorageValue::path_uncovered, "path uncovered", 6, StorageCodec::unit},
-    {StorageValue::path_spread, "path spread", 6, StorageCodec::unit},
+    {StorageValue::path_spread_up, "path spread up", 4, StorageCodec::unit},
+    {StorageValue::path_spread_down, "path spread down", 3, StorageCodec::unit},
     {StorageValue::path_ior_excess, "path ior excess", 6, StorageCodec::unit, 0.0, 1.6},
     {StorageValue::path_bend, "path bend", 4, StorageCodec::unit},
 };
@@ -110,7 +111,8 @@ void for_each_closure_field(std::uint32_t index, std::uint32_t closure_count, st
         field(StorageValue::weight);
         field(StorageValue::path_transmittance);
         field(StorageValue::path_uncovered);
-        field(StorageValue::path_spread);
+        field(StorageValue::path_spread_up);
+        field(StorageValue::path_spread_down);
         field(StorageValue::path_ior_excess);
         field(StorageValue::path_bend);
     } else if (closure_count > 1) {
@@ -426,10 +428,17 @@ StoredPixel pack_pixel(const StorageLayout& layout, const ShadedTree& shaded, co
                     (closure->path.uncovered.r + closure->path.uncovered.g + closure->path.uncovered.b) / 3.0,
                     next_dither());
                 break;
-            case StorageValue::path_spread:
-                code = encode_number(format, field.bits,
-                                     (closure->path.spread.r + closure->path.spread.g + closure->path.spread.b) / 3.0,
-                                     next_dither());
+            case StorageValue::path_spread_up:
+                code = encode_number(
+                    format, field.bits,
+                    (closure->path.spread_up.r + closure->path.spread_up.g + closure->path.spread_up.b) / 3.0,
+                    next_dither());
+                break;
+            case StorageValue::path_spread_down:
+                code = encode_number(
+                    format, field.bits,
+                    (closure->path.spread_down.r + closure->path.spread_down.g + closure->path.spread_down.b) / 3.0,
+                    next_dither());
                 break;
             case StorageValue::path_ior_excess:
                 code = encode_number(format, field.bits, closure->path.ior_excess, next_dither());
@@ -521,8 +530,10 @@ Expected<UnpackedMaterial> unpack_pixel(const StoredPixel& pixel) {
                 result.path.transmittance = library.unpack_color(code);
             } else if (value == StorageValue::path_uncovered) {
                 result.path.uncovered = glm::dvec3(decode_number(format, format.bits, code));
-            } else if (value == StorageValue::path_spread) {
-                result.path.spread = glm::dvec3(decode_number(format, format.bits, code));
+            } else if (value == StorageValue::path_spread_up) {
+                result.path.spread_up = glm::dvec3(decode_number(format, format.bits, code));
+            } else if (value == StorageValue::path_spread_down) {
+                result.path.spread_down = glm::dvec3(decode_number(format, format.bits, code));
             } else if (value == StorageValue::path_ior_excess) {
                 result.path.ior_excess = decode_number(format, format.bits, code);
             } else if (value == StorageValue::path_bend) {

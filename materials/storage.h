@@ -50,8 +50,8 @@ enum class StorageValue : std::uint8_t {
     // of a closure
     f0, albedo, roughness, f90, f82, second_roughness, second_weight, fuzz_amount, fuzz_color, fuzz_roughness,
     anisotropy, film_thickness, film_ior, specular_lut, glint_density, glint_x, glint_y, glint_dx_x, glint_dx_y,
-    glint_dy_x, glint_dy_y, medium_transmittance, grey_weight, weight, path_transmittance, path_uncovered, path_spread,
-    path_ior_excess, path_bend,
+    glint_dy_x, glint_dy_y, medium_transmittance, grey_weight, weight, path_transmittance, path_uncovered, path_spread_up,
+    path_spread_down, path_ior_excess, path_bend,
 };
 
 /// How a number becomes bits (materials/closures/stored_fields.glsl).

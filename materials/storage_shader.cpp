@@ -202,9 +202,12 @@ class Writer {
             case StorageValue::path_uncovered:
                 return encode(format, field.bits,
                               fmt::format("dot(state.paths[{}].uncovered, vec3(1.0 / 3.0))", closure), next_dither());
-            case StorageValue::path_spread:
-                return encode(format, field.bits, fmt::format("dot(state.paths[{}].spread, vec3(1.0 / 3.0))", closure),
-                              next_dither());
+            case StorageValue::path_spread_up:
+                return encode(format, field.bits,
+                              fmt::format("dot(state.paths[{}].spread_up, vec3(1.0 / 3.0))", closure), next_dither());
+            case StorageValue::path_spread_down:
+                return encode(format, field.bits,
+                              fmt::format("dot(state.paths[{}].spread_down, vec3(1.0 / 3.0))", closure), next_dither());
             case StorageValue::path_ior_excess:
                 return encode(format, field.bits, fmt::format("state.paths[{}].ior_excess", closure), next_dither());
             case StorageValue::path_bend:
@@ -352,7 +355,8 @@ StoredClosure read_stored_closure(inout StoredHeader header, uint index, float t
         closure.path.weight = {};
         closure.path.transmittance = {};
         closure.path.uncovered = vec3({});
-        closure.path.spread = vec3({});
+        closure.path.spread_up = vec3({});
+        closure.path.spread_down = vec3({});
         closure.path.ior_excess = {};
         closure.path.bend = {};
 #endif
@@ -366,7 +370,8 @@ StoredClosure read_stored_closure(inout StoredHeader header, uint index, float t
 #endif
 )",
           read(StorageValue::medium_transmittance), read(StorageValue::weight), read(StorageValue::path_transmittance),
-          read(StorageValue::path_uncovered), read(StorageValue::path_spread), read(StorageValue::path_ior_excess),
+          read(StorageValue::path_uncovered), read(StorageValue::path_spread_up), read(StorageValue::path_spread_down),
+          read(StorageValue::path_ior_excess),
           read(StorageValue::path_bend), read(StorageValue::grey_weight));
     return text;
 }

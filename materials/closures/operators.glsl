@@ -86,9 +86,12 @@ struct Matter {
     float alpha2;             // squared GGX alpha of that lobe, as it is seen from directly above
     float ior;                // against what lies above
     float bend;               // 1 - 1 / ior^2 of what `transmittance` lies in: how directions turn towards the normal
-    // Of light that is mirrored below and seen in the view direction, the share that was scattered on its way down or up,
-    // and not only forwards.
-    vec3 scattered;
+    // What the medium scatters, and not only forwards: of light from below that is seen in the view direction the share
+    // of what leaves, of light that comes down to be mirrored there the share of what arrives, and of diffuse light from
+    // below the share that is thrown back.
+    vec3 scattered_up;
+    vec3 scattered_down;
+    vec3 scattered_back;
     float cos_view;           // of the view as it comes from above
 };
 
@@ -97,7 +100,10 @@ struct Path {
     vec3 weight;            // of the slab's radiance, without its own coverage
     vec3 uncovered;         // share of `weight` that passes by all matter above, [0, 1]
     vec3 transmittance;     // of the rest for light, along the normal; top_transmittance turns it to the light
-    vec3 spread;            // share of what a lobe mirrors that comes up as diffuse light
+    // Of the light that a lobe mirrors, the share that meets the slab as diffuse light, since it was scattered on its way
+    // up or thrown back; and of the rest the share that was scattered on its way down.
+    vec3 spread_up;
+    vec3 spread_down;
     float ior_excess;       // index - 1 of what lies directly above the slab, against what is above all matter
     float bend;             // 1 - 1 / ior^2 of what `transmittance` lies in
 };
@@ -184,7 +190,9 @@ Matter no_matter() {
     m.alpha2 = 0.0;
     m.ior = 1.0;
     m.bend = 0.0;
-    m.scattered = vec3(0.0);
+    m.scattered_up = vec3(0.0);
+    m.scattered_down = vec3(0.0);
+    m.scattered_back = vec3(0.0);
     m.cos_view = 1.0;
     return m;
 }
@@ -202,7 +210,8 @@ Path open_path() {
     path.weight = vec3(1.0);
     path.uncovered = vec3(1.0);
     path.transmittance = vec3(1.0);
-    path.spread = vec3(0.0);
+    path.spread_up = vec3(0.0);
+    path.spread_down = vec3(0.0);
     path.ior_excess = 0.0;
     path.bend = 0.0;
     return path;
@@ -245,7 +254,8 @@ Matter base_matter(Slab slab, float cos_view) {
     vec3 lost = absorbed;
     vec3 scattered = vec3(1.0);
     m.transmittance = vec3(0.0);
-    m.scattered = scattered;
+    m.scattered_up = scattered;
+    m.scattered_down = scattered;
 #ifdef NACRE_SLAB_MEDIUM
     if ((slab.features & slab_medium) != 0u) {
         MediumScattering medium = slab_scattering(slab, mean_cosine);
@@ -258,8 +268,9 @@ Matter base_matter(Slab slab, float cos_view) {
         albedo = min(reflected * leaving * between, vec3(1.0));
         passed = through * between;
         lost = absorbed * between;
-        // Of light from all around on its way down, that which is thrown back counts as well.
-        m.scattered = either(scattered, medium.reflected);
+        m.scattered_up = scattered;
+        m.scattered_down = either(scattered, medium.reflected);
+        m.scattered_back = medium.reflected;
         m.transmittance =
             exp(log(clamp((through + vec3(1e-30)) / (medium.kept + vec3(1e-30)), vec3(1e-30), vec3(1.0))) * mean_cosine);
     }
@@ -302,10 +313,12 @@ Matter slab_matter(Slab slab, Closure closure) {
         // Up by the view's own share. Down it comes at the same angle: what goes straight falls with the way's length.
         vec3 up = (through + vec3(1e-30)) / (m.view_transmittance + vec3(1e-30));
         float way = mean_cosine / max(refracted_cosine(closure.view.z, closure.reflectance), 0.01);
-        vec3 down = vec3(exponential_rest(minus_log_rest(m.scattered.x) * way),
-                         exponential_rest(minus_log_rest(m.scattered.y) * way),
-                         exponential_rest(minus_log_rest(m.scattered.z) * way));
-        m.scattered = either(up, down) * (1.0 - max(slab.phase_anisotropy, 0.0));
+        vec3 down = vec3(exponential_rest(minus_log_rest(m.scattered_down.x) * way),
+                         exponential_rest(minus_log_rest(m.scattered_down.y) * way),
+                         exponential_rest(minus_log_rest(m.scattered_down.z) * way));
+        float sideways = 1.0 - max(slab.phase_anisotropy, 0.0);
+        m.scattered_up = up * sideways;
+        m.scattered_down = down * sideways;
     }
 #endif
     return m;
@@ -351,6 +364,18 @@ Bounces bounces_between(Matter top, Matter base) {
     return bounces;
 }
 
+// Of the light that a base mirrors to the view and a layer lets out, the share that the layer's medium scattered back to
+// the base at least once: by the angle at which it comes up first, and as diffuse light from then on.
+vec3 thrown_back(Matter top, Matter base) {
+    vec3 back = top.scattered_back;
+    float cosine = lobe_cosine(min(2.7 * sqrt(base.alpha2), 0.55), top.cos_view);
+    float way = mean_cosine / mix(mean_cosine, cosine, dot(base.gloss, vec3(1.0 / 3.0)));
+    vec3 first = vec3(exponential_rest(minus_log_rest(back.x) * way), exponential_rest(minus_log_rest(back.y) * way),
+                      exponential_rest(minus_log_rest(back.z) * way));
+    vec3 later = first * base.albedo * (vec3(1.0) - back);
+    return later / max(later + (vec3(1.0) - first) * (vec3(1.0) - back * base.albedo), vec3(1e-30));
+}
+
 // Of what lies below, seen through matter that covers only a part.
 vec3 matter_throughput(Matter m) { return vec3(m.bare) + m.coverage * m.view_transmittance; }
 
@@ -376,6 +401,8 @@ float alpha2_of_both(float alpha2_a, vec3 mirrored_a, float alpha2_b, vec3 mirro
 float medium_weight(vec3 transmittance, vec3 scattered) {
     return -log(clamp(dot(transmittance, vec3(1.0 / 3.0)), 1e-3, 1.0)) + dot(scattered, vec3(1.0 / 3.0));
 }
+
+vec3 scattered_by(Matter m) { return either(m.scattered_up, m.scattered_down); }
 
 // Of two media, by that and by how much each covers.
 float bend_of_both(float bend_a, float weight_a, float bend_b, float weight_b) {
@@ -404,9 +431,11 @@ Matter mix_matter(Matter a, Matter b, float amount) {
     m.gloss = gloss_of_both(a, covered_a * a.albedo, b, covered_b * b.albedo);
     m.alpha2 = alpha2_of_both(a.alpha2, covered_a * a.albedo * a.gloss, b.alpha2, covered_b * b.albedo * b.gloss);
     m.ior = mix(a.ior, b.ior, share);
-    m.bend = bend_of_both(a.bend, covered_a * medium_weight(a.transmittance, a.scattered), b.bend,
-                          covered_b * medium_weight(b.transmittance, b.scattered));
-    m.scattered = mix(a.scattered, b.scattered, share);
+    m.bend = bend_of_both(a.bend, covered_a * medium_weight(a.transmittance, scattered_by(a)), b.bend,
+                          covered_b * medium_weight(b.transmittance, scattered_by(b)));
+    m.scattered_up = mix(a.scattered_up, b.scattered_up, share);
+    m.scattered_down = mix(a.scattered_down, b.scattered_down, share);
+    m.scattered_back = mix(a.scattered_back, b.scattered_back, share);
     m.cos_view = a.cos_view;
     return m;
 }
@@ -455,9 +484,11 @@ Matter layer_matter(Matter top, Matter base) {
     m.gloss = gloss_of_both(top, of_top, base, of_base);
     m.alpha2 = alpha2_of_both(top.alpha2, of_top * top.gloss,
                               base.alpha2 * square(mix(1.0, top.ior, tb / max(b + tb, 1e-30))), of_base * base.gloss);
-    m.bend = bend_of_both(top.bend, (t + tb) * medium_weight(top.transmittance, top.scattered),
-                          either(top.bend, base.bend), (b + tb) * medium_weight(base.transmittance, base.scattered));
-    m.scattered = either(top.scattered * (t + tb), base.scattered * (b + tb));
+    m.bend = bend_of_both(top.bend, (t + tb) * medium_weight(top.transmittance, scattered_by(top)),
+                          either(top.bend, base.bend), (b + tb) * medium_weight(base.transmittance, scattered_by(base)));
+    m.scattered_up = either(top.scattered_up * (t + tb), base.scattered_up * (b + tb));
+    m.scattered_down = either(top.scattered_down * (t + tb), base.scattered_down * (b + tb));
+    m.scattered_back = either(top.scattered_back * (t + tb), base.scattered_back * (b + tb));
     m.ior = mix(1.0, top.ior, t + tb) * mix(1.0, base.ior, b + tb);
     m.cos_view = top.cos_view;
     return m;
@@ -475,7 +506,7 @@ Path path_through_mix(Path path, float amount) {
 Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     vec3 beside = vec3(top.bare);
     // What was scattered above on its way up is diffuse light here.
-    vec3 scattered = scattered_up(path.spread);
+    vec3 scattered = path.spread_up;
     Matter seen = top;
     seen.cos_view = mix(top.cos_view, mean_cosine, dot(scattered, vec3(1.0 / 3.0)));
     Bounces bounces = bounces_between(seen, base);
@@ -485,8 +516,13 @@ Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     vec3 by = beside / max(sum, vec3(1e-30));
     Path above;
     above.weight = path.weight * sum;
-    vec3 spread_by_top = top.scattered * through / max(sum, vec3(1e-30));
-    above.spread = either(path.spread, spread_by_top);
+    vec3 covered_share = through / max(sum, vec3(1e-30));
+    vec3 up_by_top = either(top.scattered_up, thrown_back(top, base)) * covered_share;
+    vec3 down_by_top = top.scattered_down * covered_share;
+    // Diffuse light passes an interface more easily than what comes along it.
+    vec3 up_above = scattered * (beside + top.coverage * top.passed * bounces.leaving) / max(sum, vec3(1e-30));
+    above.spread_up = either(min(up_above, vec3(1.0)), up_by_top);
+    above.spread_down = either(path.spread_down, down_by_top);
     above.ior_excess = widening.ior_excess;
     above.uncovered = path.uncovered * by;
     // What light keeps at normal incidence is the product of both layers', exactly; at other angles the one layer
@@ -494,9 +530,9 @@ Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
     vec3 kept_above = mix(path.transmittance, vec3(1.0), path.uncovered);
     vec3 kept_by_top = mix(top.transmittance, vec3(1.0), by);
     vec3 kept = kept_above * kept_by_top;
-    above.bend = bend_of_both(path.bend, medium_weight(kept_above, path.spread),
+    above.bend = bend_of_both(path.bend, medium_weight(kept_above, either(path.spread_up, path.spread_down)),
                               either(refraction_bend(path.ior_excess), top.bend),
-                              medium_weight(kept_by_top, spread_by_top));
+                              medium_weight(kept_by_top, either(up_by_top, down_by_top)));
     vec3 covered = max(vec3(1.0) - above.uncovered, vec3(1e-30));
     above.transmittance = min(max(kept - above.uncovered, vec3(0.0)) / covered, vec3(1.0));
     return above;
@@ -506,8 +542,11 @@ Path path_through_layer(Path path, Matter top, Matter base, Widening widening) {
 // view_cosine: outside.
 Closure closure_below_path(Closure closure, Slab slab, Path path, float view_cosine) {
     Cover cover;
-    cover.spread = path.spread;
-    cover.mean = fresnel_mean(slab_fresnel(slab));
+    cover.spread_up = path.spread_up;
+    cover.spread_down = path.spread_down;
+    Fresnel fresnel = slab_fresnel(slab);
+    cover.mean = fresnel_mean(fresnel);
+    cover.rise = fresnel.grazing - fresnel.normal;
     // Light that is thrown back goes through the medium that is as dense as what lies directly above, not through what
     // lies above that.
     float dense = saturated(path.bend / max(refraction_bend(path.ior_excess), 1e-6));

@@ -9,6 +9,7 @@ namespace nacre::materials::closures {
 
 /// The closures of a shader that defines NACRE_FUZZ_MODEL as 1, in double precision: Library has the other model.
 #undef NACRE_CLOSURES_CLOSURE
+#undef NACRE_CLOSURES_PREPARED_CLOSURE
 #undef NACRE_CLOSURES_SLAB
 #undef NACRE_CLOSURES_TABLES
 #undef NACRE_FUZZ_MODEL

@@ -281,6 +281,7 @@ TEST(ClosureFeatures, WhatASlabDoesNotUseDoesNotExist) {
         {"materials/closures/medium.glsl", "NACRE_SLAB_MEDIUM"},
         {"materials/closures/thin_film.glsl", "NACRE_SLAB_THIN_FILM"},
         {"materials/closures/classic.glsl", ""},
+        {"materials/closures/covered_closure.glsl", "NACRE_CLOSURE_COVERED"},
         {"materials/closures/haze.glsl", ""},
     };
     const std::vector<std::uint32_t> plain = words_of({}, embedded_files());
@@ -292,6 +293,7 @@ TEST(ClosureFeatures, WhatASlabDoesNotUseDoesNotExist) {
     }
     for (const char* model : {"1", "2"})
         EXPECT_NE(words_of({{"NACRE_DIFFUSE_MODEL", model}}, embedded_files()), plain) << "diffuse model " << model;
+    EXPECT_NE(words_of({{"NACRE_CLOSURE_COVERED", "1"}}, embedded_files()), plain) << "below layers";
     // The comparison can fail: with a feature the shader is another.
     for (const SlabFeature& feature : slab_features()) {
         if (feature.bit == slab_emission || feature.bit == slab_edge_coverage) continue;

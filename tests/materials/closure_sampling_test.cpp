@@ -124,7 +124,8 @@ TEST(ClosureSampling, SamplesBelowALayerFollowTheDensity) {
             const glm::dvec3 view = direction(cosine, 0.4);
             const auto inside = library.prepare_closure(Library::slab_of(test.slab),
                                                         library.refracted_direction(view, 0.5), 1e-3);
-            const auto closure = library.cover_closure(inside, {.spread = glm::dvec3(0.2),
+            const auto closure = library.cover_closure(inside, {.spread_up = glm::dvec3(0.1),
+                                                                .spread_down = glm::dvec3(0.12),
                                                                 .mean = glm::dvec3(0.5),
                                                                 .kept = glm::dvec3(1.0),
                                                                 .bend = 0.0,
