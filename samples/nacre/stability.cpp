@@ -20,6 +20,8 @@ Outcome run(const StabilityArguments& arguments) {
     // Mesa's software drivers compile many large shaders here, each for few points: without optimization, and beside
     // that as everywhere (backends/gl/quirks.cpp). What is computed stays the same.
     ::setenv("GALLIVM_PERF", "nopt,no_quad_lod,no_aos_sampling,no_brilinear,no_rho_approx", /*overwrite=*/0);
+    // Points go to a device by tens of thousands: of the largest tree they take longer than any shader of a frame may.
+    ::setenv("NACRE_CPU_WATCHDOG_SECONDS", "600", /*overwrite=*/0);
     const auto instance = make_instance();
     if (!arguments.output.empty()) {
         // Before the work of half an hour, not after it.
